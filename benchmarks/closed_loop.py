@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan
 from benchmarks.support.nodes import Nodes
 from msgs_config.arrays import FloatArray

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.metrics.run_metrics import Tick
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from benchmarks.support.deep_mimic import DeepMimicStablePd
 from benchmarks.support.ratios import Ratio

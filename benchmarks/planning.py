@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.yardstick import yardstick_us

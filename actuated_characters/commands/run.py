@@ -36,9 +36,9 @@ from msgs_config.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
-    from actuated_characters.runs.planned_throws import PlannedThrow
-    from actuated_characters.runs.planned_velocities import PlannedVelocity
-    from actuated_characters.runs.planned_wrenches import PlannedPush
+    from actuated_characters.runs.planned.throws import PlannedThrow
+    from actuated_characters.runs.planned.velocities import PlannedVelocity
+    from actuated_characters.runs.planned.wrenches import PlannedPush
     from controller_node.references.files.reconstructed import FoundWith
 
 _DURATION = 10.0  # s
@@ -153,8 +153,8 @@ class PlannedRun:
 def planned_run(options: argparse.Namespace) -> PlannedRun:
     """Plan the run that the options describe; raises ActuatedCharactersError if it cannot be."""
     from actuated_characters.runs.plan import make_plan
-    from actuated_characters.runs.planned_throws import plan_throws
-    from actuated_characters.runs.planned_velocities import plan_velocities
+    from actuated_characters.runs.planned.throws import plan_throws
+    from actuated_characters.runs.planned.velocities import plan_velocities
     from msgs_config.character.loading import load_character
     from msgs_config.shared_parameters import collides
 
@@ -241,7 +241,7 @@ def _run_plan(
     """Run a plan; returns of each throw whether the ball hit, and when."""
     from actuated_characters.runs.execution import run_over_topics
     from actuated_characters.runs.in_process import run_in_process
-    from actuated_characters.runs.throw_hits import describe_hits, read_states
+    from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 
     check_interruption()  # all modules are imported by now
     plan, pushes, throws = planned.plan, planned.pushes, planned.throws
@@ -284,7 +284,7 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
 
 def _pushes(texts: list[str], plan: "RunPlan", found_in: "FoundWith | None") -> "list[PlannedPush]":
     """Those of `--push`; without any, those with which a reconstruction was found."""
-    from actuated_characters.runs.planned_wrenches import parse_push, parse_pushes_within
+    from actuated_characters.runs.planned.wrenches import parse_push, parse_pushes_within
 
     if _NO_PUSH in texts:
         if set(texts) != {_NO_PUSH}:

@@ -14,7 +14,7 @@ from actuated_characters.replay.players.character_files import write_character, 
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import Progress, run_in_process
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.throw_hits import describe_hits, read_states
+from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.parameters import Values

@@ -19,8 +19,8 @@ from actuated_characters.replay.world import (
     make_pushes,
     simulator_values,
 )
-from actuated_characters.runs.planned_throws import PlannedThrow
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.throws import PlannedThrow
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from sim_node.node_settings import make_node_settings

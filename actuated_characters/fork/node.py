@@ -26,9 +26,9 @@ from actuated_characters.replay.comparison import (
 from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.processes import ANSWER_TIMEOUT
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
-from actuated_characters.runs.planned_files import Planned
-from actuated_characters.runs.planned_throws import read_throws
-from actuated_characters.runs.planned_wrenches import read_pushes
+from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.throws import read_throws
+from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import ComposableNode, Turns, ros_node
 from msgs_config.bus.node import BusNode, Executor, Publisher, StopFlag, Subscription
 from msgs_config.errors import ReplayError, RunError

@@ -17,9 +17,9 @@ from actuated_characters.replay.comparison import clock_of
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.world import simulator_values
 from actuated_characters.runs.plan import RunPlan, count_ticks
-from actuated_characters.runs.planned_files import Planned
-from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws
-from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
+from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws
+from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node import parameters as controller_parameters
 from controller_node.planner.factory import check_installed
 from controller_node.references.base import Reference, ReferenceState

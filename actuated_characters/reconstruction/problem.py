@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
+from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node.planner.settings import PREDICTIVE, RECORDED
 from controller_node.references.files.clip import read_clip
 from msgs_config.character.loading import load_character

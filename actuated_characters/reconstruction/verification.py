@@ -10,7 +10,7 @@ from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.tree import Node
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages import configuration

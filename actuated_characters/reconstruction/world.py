@@ -6,7 +6,7 @@ import numpy as np
 
 from actuated_characters.metrics.error_measures import is_lost
 from actuated_characters.reconstruction.problem import Problem
-from actuated_characters.runs.planned_wrenches import push_schedule
+from actuated_characters.runs.planned.wrenches import push_schedule
 from controller_node.parameters import make_controller
 from controller_node.planner.planner import PlannerSnapshot, PredictivePlanner
 from controller_node.references.base import ReferenceState

@@ -11,9 +11,9 @@ from actuated_characters.recorder.run_directory import (
 )
 from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_throws import PlannedThrow
-from actuated_characters.runs.planned_velocities import PlannedVelocity
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.throws import PlannedThrow
+from actuated_characters.runs.planned.velocities import PlannedVelocity
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.senders import check_recorded, plan_senders

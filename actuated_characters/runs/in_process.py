@@ -1,4 +1,4 @@
-"""Runs in this process, without ROS: of the nodes on a bus of their own, or of the bare loop."""
+"""Runs in this process, without ROS: the nodes of a run over topics, on a bus of their own."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -6,79 +6,66 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
-from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.recorder.in_process import InProcessRecorder
 from actuated_characters.recorder.run_directory import LOGS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
 from actuated_characters.runs.perturbation_node import PerturbationNode
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_throws import PlannedThrow
-from actuated_characters.runs.planned_velocities import PlannedVelocity
-from actuated_characters.runs.planned_wrenches import PlannedPush, push_schedule
+from actuated_characters.runs.planned.throws import PlannedThrow
+from actuated_characters.runs.planned.velocities import PlannedVelocity
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.runs.senders import check_recorded, plan_senders
-from controller_node.controller import Controller
 from controller_node.node import ControllerNode
-from controller_node.parameters import make_controller
 from msgs_config.bus.composition import ComposableNode, run_nodes
 from msgs_config.bus.in_process import Bus, InProcessNode
 from msgs_config.bus.node import BusNode
 from msgs_config.errors import RecordingError
-from msgs_config.messages.clock import TickClock
+from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from sim_node.node import SimNode
-from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowQueue
-from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 _PROGRESS_PERIOD = 0.1  # s between words on the progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
+_MAKERS: Mapping[str, Callable[[BusNode], ComposableNode]] = {
+    topics.SIM_NODE: SimNode,
+    topics.CONTROLLER_NODE: ControllerNode,
+}
 
 Progress = Callable[[int], None]
 """Is called with the number of ticks so far."""
-Watch = Callable[[Simulation], object]
-"""Is called with the simulation after each tick."""
 
 
-def ticks_in_process(
-    plan: RunPlan,
-    pushes: Sequence[PlannedPush] = (),
-    throws: Sequence[PlannedThrow] = (),
-    controller: Controller | None = None,
-    watch: Watch | None = None,
-) -> Iterator[Tick]:
-    """The ticks of a plan, one by one, with pushes and throws.
+def run_together(
+    given: Mapping[str, Mapping[str, object]],
+    directory: Path,
+    progress: Progress = lambda ticks: None,
+    makers: Mapping[str, Callable[[BusNode], ComposableNode]] = _MAKERS,
+) -> None:
+    """Run a recorder and other nodes on a bus of this process, until one of them ends.
 
-    The states are those of a run over topics, bit for bit. To look at the controller as well, give
-    a fresh one of the plan; to look at the simulation, a `watch`.
+    Args:
+        given: Parameters of each by its full name, such as `left/controller_node`, in the order of
+            their turns; the recorder's among them, into whose directory they are recorded.
+        directory: Where parameters and logs go, as those of processes do.
+        progress: Is told the last tick now and then.
+        makers: Of nodes beside simulator and controller, by their names.
 
     Raises:
-        SimulationError: the simulation diverged.
+        ActuatedCharactersError: one of the nodes failed.
     """
-    controller = controller or make_controller(plan.character, plan.reference, plan.controller)
-    setup = make_character_setup(plan.character, plan.simulator)
-    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
-    balls = ThrowQueue()
-    for throw in throws:
-        balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
-    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
-        simulation.watches_contacts = controller.needs_contacts
-        (character,) = simulation.characters
-        episode_ns = character.state.stamp_ns
-        drives_all = character.commanded.all()
-        for _ in range(plan.ticks):
-            state = character.state
-            touched = None if character.contacts is None else character.contacts.wrenches
-            effort, reference = controller.compute_effort(state, episode_ns, touched)
-            commanded = effort if drives_all else np.where(character.commanded, effort, 0.0)
-            acting, thrown = wrenches.take(simulation.tick), balls.take(simulation.tick)
-            simulation.step([commanded], [acting], thrown)
-            following = character.state
-            assert following.effort is not None
-            if watch is not None:
-                watch(simulation)
-            yield Tick(state, following, reference)
+    makers = {**_MAKERS, **makers}
+    bus = Bus(partial(_log, directory / LOGS))
+    places: dict[str, InProcessNode] = {}
+    for full_name, parameters in given.items():
+        namespace, _, name = full_name.rpartition("/")
+        write_parameters(directory, full_name.replace("/", "."), parameters, full_name)
+        places[full_name] = bus.node(name, parameters, namespace)
+    recording = places.pop(topics.RECORDER_NODE)
+    with signals_held(most=1) as stop, _recorder(recording, progress) as recorder:
+        nodes: list[ComposableNode] = [recorder]
+        for place in places.values():
+            nodes.append(makers[place.get_name()](place))
+        run_nodes(nodes, stop)
 
 
 def run_in_process(
@@ -113,15 +100,8 @@ def run_in_process(
         "controller_node": {**plan.controller, "wait_for_subscribers": 2 + len(senders)},
         "sim_node": {**plan.simulator, "wait_for_subscribers": 2 + (fork is not None)},
     }
-    for name, parameters in given.items():
-        write_parameters(directory, name, parameters)
-    bus = Bus(partial(_log, directory / LOGS))
-    places = {name: bus.node(name, {**parameters, **session}) for name, parameters in given.items()}
-    with signals_held(most=1) as stop, _recorder(places["recorder"], progress) as recorder:
-        nodes: list[ComposableNode] = [recorder]
-        nodes += [make_sender(places[name]) for name in senders]
-        nodes += [ControllerNode(places["controller_node"]), SimNode(places["sim_node"])]
-        run_nodes(nodes, stop)
+    given = {name: {**parameters, **session} for name, parameters in given.items()}
+    run_together(given, directory, progress, makers=dict.fromkeys(senders, make_sender))
     counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
     check_recorded(directory, plan.ticks - resets, counts)
 

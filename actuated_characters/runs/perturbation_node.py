@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from actuated_characters.runs.planned_throws import read_throws
-from actuated_characters.runs.planned_velocities import read_velocities
-from actuated_characters.runs.planned_wrenches import read_pushes
+from actuated_characters.runs.planned.throws import read_throws
+from actuated_characters.runs.planned.velocities import read_velocities
+from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.messages import topics

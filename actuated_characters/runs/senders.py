@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from actuated_characters.recorder.run_directory import PARAMETERS, read_metrics
-from actuated_characters.runs.planned_files import Planned, write_planned
+from actuated_characters.runs.planned.files import Planned, write_planned
 from msgs_config.errors import RunError
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.plots import THEORY, label
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.studies.framework.bodies import (
     HINGE,
     IN_SPACE,

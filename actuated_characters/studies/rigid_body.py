@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.plots import draw_over_theory, label
 from actuated_characters.render.stills import pose_strip
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.studies.framework.bodies import IN_SPACE, Box, Momenta, momenta, write_box
 from actuated_characters.studies.framework.result import Row, StudyResult
 from actuated_characters.studies.framework.study import HOLD, RunSpec, StudyRunner

@@ -13,8 +13,8 @@ import numpy as np
 
 from actuated_characters.metrics.falls import FallWatch, PostureReader
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_velocities import plan_velocities
-from actuated_characters.runs.planned_wrenches import parse_push, push_schedule
+from actuated_characters.runs.planned.velocities import plan_velocities
+from actuated_characters.runs.planned.wrenches import parse_push, push_schedule
 from controller_node.behaviours.base import Observation
 from controller_node.behaviours.state_machine.description import Machine
 from controller_node.behaviours.state_machine.factory import kit_of

@@ -27,9 +27,9 @@ from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.metrics.error_measures import is_lost, joint_errors  # noqa: E402
-from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
+from actuated_characters.runs.bare_loop import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
-from actuated_characters.runs.planned_wrenches import parse_pushes_within  # noqa: E402
+from actuated_characters.runs.planned.wrenches import parse_pushes_within  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
 from controller_node.references.files.clip import available_clips, read_clip  # noqa: E402
 from msgs_config.character.dynamics import DynamicsModel  # noqa: E402

@@ -28,10 +28,10 @@ from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.metrics.falls import FallWatch, PostureReader  # noqa: E402
-from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
+from actuated_characters.runs.bare_loop import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
-from actuated_characters.runs.planned_throws import PlannedThrow, plan_throws  # noqa: E402
-from actuated_characters.runs.planned_wrenches import PlannedPush, plan_push  # noqa: E402
+from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws  # noqa: E402
+from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push  # noqa: E402
 from benchmarks.planner.push_picture import draw  # noqa: E402
 from benchmarks.planner.walks import KINDS, Impulse, Walk, walks  # noqa: E402
 from controller_node.behaviours.base import Mode  # noqa: E402

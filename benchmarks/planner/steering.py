@@ -31,9 +31,9 @@ from rich.table import Table  # noqa: E402
 
 from actuated_characters.commands.common.settings import node_settings  # noqa: E402
 from actuated_characters.metrics.falls import FallWatch, PostureReader  # noqa: E402
-from actuated_characters.runs.in_process import ticks_in_process  # noqa: E402
+from actuated_characters.runs.bare_loop import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
-from actuated_characters.runs.planned_velocities import plan_velocities  # noqa: E402
+from actuated_characters.runs.planned.velocities import plan_velocities  # noqa: E402
 from benchmarks.planner.pushes import NODES  # noqa: E402
 from controller_node.references.steering.reference import SteeredReference  # noqa: E402
 from controller_node.references.steering.velocity import VelocityCommand  # noqa: E402

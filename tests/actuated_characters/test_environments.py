@@ -16,7 +16,7 @@ import actuated_characters as ac
 from actuated_characters.environments import TRACK
 from actuated_characters.environments.track import TrackEnv
 from actuated_characters.metrics.run_metrics import StateHash
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray

@@ -21,8 +21,8 @@ from actuated_characters.recorder.run_directory import (
 )
 from actuated_characters.render.stills import save_png
 from actuated_characters.report.metrics_plot import plot_metrics
-from actuated_characters.runs.planned_files import write_planned
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError
 from tests.support.limits import file_size_limit

@@ -5,7 +5,7 @@ Not more than nearly: its mass matrix is PyBullet's, see docs/design.md.
 
 import numpy as np
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from benchmarks.support.deep_mimic import _LARGEST_EFFORTS, DeepMimicStablePd
 from controller_node.parameters import make_controller

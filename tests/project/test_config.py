@@ -17,7 +17,7 @@ from actuated_characters.bags.recording import read_recordings
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.processes import MODULES
 from controller_node import parameters as for_controller

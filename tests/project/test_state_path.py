@@ -19,8 +19,8 @@ ENTRANCES = [  # what works out states and efforts, and what a run of `--in-proc
     "controller_node/node.py",
     "actuated_characters/runs/in_process.py",
     "actuated_characters/runs/plan.py",
-    "actuated_characters/runs/planned_wrenches.py",
-    "actuated_characters/runs/planned_throws.py",
+    "actuated_characters/runs/planned/wrenches.py",
+    "actuated_characters/runs/planned/throws.py",
 ]
 HOME = {
     "msgs_config/geometry/elementary.py",

@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.run_metrics import Tick
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.joint_state import JointStateEncoder

@@ -10,6 +10,8 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from actuated_characters.recorder.run_directory import prepare_directory
+from actuated_characters.runs.in_process import run_together
 from msgs_config.character.file import CHARACTERS_DIRECTORY
 from msgs_config.messages import topics
 from tests.support.physics import character
@@ -157,19 +159,36 @@ def record_realtime(folder: Path, context: Context) -> Path:
     return folder / "realtime" / "run"
 
 
+PAIR = ["left", "right"]
+_PLACES = {"left": [0.0] * 4, "right": [0.0, 2.0, 0.0, 0.5]}
+_WORLD_OF_PAIR: dict[str, object] = {
+    **{"characters": PAIR, "character": "pendulum", "max_ticks": 40, "wait_for_subscribers": 2},
+    **{"right.placement": _PLACES["right"], "right.initial_position": [0.3]},
+}
+
+
+def _one_of_pair(name: str) -> dict[str, object]:
+    return {"character": "pendulum", "placement": _PLACES[name], "wait_for_subscribers": 2}
+
+
 def record_pair(folder: Path) -> Path:
     """Two pendulums in one world."""
-    names, places = ["left", "right"], {"left": [0.0] * 4, "right": [0.0, 2.0, 0.0, 0.5]}
-    with recorded(folder / "pair", characters=names) as processes:
-        simulator = processes.simulator(
-            characters=names,
-            right__placement=places["right"],
-            right__initial_position=[0.3],
-            max_ticks=40,
-            wait_for_subscribers=2,
-        )
-        for name in names:
-            own = {"character": "pendulum", "placement": places[name]}
-            processes.node(topics.CONTROLLER_NODE, name, wait_for_subscribers=2, **own)
+    with recorded(folder / "pair", characters=PAIR) as processes:
+        simulator = processes.simulator(**_WORLD_OF_PAIR)
+        for name in PAIR:
+            processes.node(topics.CONTROLLER_NODE, name, **_one_of_pair(name))
         assert simulator.wait() == 0
     return folder / "pair" / "run"
+
+
+def record_pair_in_process(folder: Path) -> Path:
+    """The same two pendulums, with all nodes in this process."""
+    directory = folder / "alone"
+    prepare_directory(directory, overwrite=False)
+    given = {
+        topics.RECORDER_NODE: {"characters": PAIR, "directory": str(directory)},
+        **{f"{name}/{topics.CONTROLLER_NODE}": _one_of_pair(name) for name in PAIR},
+        topics.SIM_NODE: _WORLD_OF_PAIR,
+    }
+    run_together(given, directory)
+    return directory

@@ -1,6 +1,6 @@
 """What a run in this process shows of its balls, as a bag does."""
 
-from actuated_characters.runs.throw_hits import States
+from actuated_characters.runs.planned.throw_hits import States
 from sim_node.physics.simulation import Simulation
 
 

@@ -13,7 +13,7 @@ from xml.parsers.expat import ExpatError
 
 import numpy as np
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel

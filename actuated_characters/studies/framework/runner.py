@@ -10,8 +10,8 @@ import numpy as np
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.in_process import run_in_process
-from actuated_characters.runs.planned_throws import plan_throws
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.throws import plan_throws
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.studies.framework.study import RunResult, RunSpec
 from msgs_config.errors import RunError, SimulationError
 

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
-from actuated_characters.runs.planned_wrenches import PlannedPush
+from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
+from actuated_characters.runs.planned.wrenches import PlannedPush
 from actuated_characters.studies.framework.result import StudyResult
 from msgs_config.character.model import Vector
 from msgs_config.messages.clock import FIRST_TICK, TickClock

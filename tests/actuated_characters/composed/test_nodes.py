@@ -11,7 +11,7 @@ from actuated_characters.bags.recording import read_recordings
 from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands, replay_states
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.messages import topics

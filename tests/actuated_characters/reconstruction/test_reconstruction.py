@@ -23,7 +23,7 @@ from actuated_characters.reconstruction.reconstruction import Job, Reconstructio
 from actuated_characters.reconstruction.search import Progress, SearchSettings, result, search
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.reconstruction.world import Branch, Grown, Place, TrialWorld
-from actuated_characters.runs.planned_wrenches import parse_pushes_within
+from actuated_characters.runs.planned.wrenches import parse_pushes_within
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from tests.support.ros import wait_until
 

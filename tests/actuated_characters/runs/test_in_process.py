@@ -13,11 +13,12 @@ from actuated_characters.recorder.run_directory import prepare_directory, read_m
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_throws import plan_throws
-from actuated_characters.runs.planned_velocities import plan_velocities
-from actuated_characters.runs.planned_wrenches import PlannedPush, parse_push
+from actuated_characters.runs.planned.throws import plan_throws
+from actuated_characters.runs.planned.velocities import plan_velocities
+from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from msgs_config.errors import RunError, SimulationError
 from msgs_config.messages.clock import TickClock
+from tests.support.recorded_nodes import PAIR, record_pair, record_pair_in_process
 from tests.support.ros import Processes
 from tests.support.runs import Run, run_plan, summary_of
 from tests.support.same_messages import assert_same_messages, messages_by_topic
@@ -92,6 +93,16 @@ def test_the_messages_are_those_of_a_run_over_topics(
         assert summary.pop("wall_time_s") > 0.0
         assert summary.pop("real_time_factor") > 0.0
     assert summaries[0] == summaries[1]
+
+
+@pytest.mark.slow
+def test_two_characters_send_what_they_send_over_topics(domain: int, tmp_path: Path) -> None:
+    del domain  # the nodes inherit it
+    alone, sent = record_pair_in_process(tmp_path), record_pair(tmp_path)
+
+    assert_same_messages(alone / "bag", sent / "bag")
+    for name in PAIR:
+        assert (alone / name / "summary.json").is_file()
 
 
 def test_its_bag_is_replayed_to_the_bit(tmp_path: Path) -> None:

@@ -11,11 +11,12 @@ import pytest
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
-from actuated_characters.runs.in_process import run_in_process, ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_files import write_planned
-from actuated_characters.runs.planned_throws import PlannedThrow, read_throws
-from actuated_characters.runs.planned_wrenches import (
+from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.throws import PlannedThrow, read_throws
+from actuated_characters.runs.planned.wrenches import (
     PlannedPush,
     plan_push,
     read_pushes,

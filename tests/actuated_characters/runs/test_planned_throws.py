@@ -13,22 +13,23 @@ from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
-from actuated_characters.runs.in_process import run_in_process, ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_throws import (
+from actuated_characters.runs.planned.throw_hits import (
+    States,
+    describe_hits,
+    find_hit,
+    read_states,
+)
+from actuated_characters.runs.planned.throws import (
     PlannedThrow,
     ThrowRequest,
     parse_throw,
     plan_throw,
     plan_throws,
 )
-from actuated_characters.runs.planned_wrenches import plan_push
-from actuated_characters.runs.throw_hits import (
-    States,
-    describe_hits,
-    find_hit,
-    read_states,
-)
+from actuated_characters.runs.planned.wrenches import plan_push
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock

@@ -10,8 +10,8 @@ from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_files import write_planned
-from actuated_characters.runs.planned_velocities import (
+from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.velocities import (
     PlannedVelocity,
     plan_velocities,
     read_velocities,

@@ -12,8 +12,8 @@ from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.report.reactions import mode_spans
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_velocities import PlannedVelocity, plan_velocities
-from actuated_characters.runs.planned_wrenches import parse_push
+from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
+from actuated_characters.runs.planned.wrenches import parse_push
 from actuated_characters.studies.athletics.measures import longest_flight
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
@@ -77,7 +77,7 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
 @pytest.mark.slow
 def test_a_trial_has_the_states_of_a_run() -> None:
     """What the benchmarks and the search for parameters run is the product, to the bit."""
-    from actuated_characters.runs.in_process import ticks_in_process
+    from actuated_characters.runs.bare_loop import ticks_in_process
 
     trial = Trial(1.6, "0.5,0,0@0.1", ("root:60,0,0@1.1",))
     machine = read_machine("walk")

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_throws import PlannedThrow
-from actuated_characters.runs.throw_hits import States, find_hit
+from actuated_characters.runs.planned.throw_hits import States, find_hit
+from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.character.bullet import pybullet
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow

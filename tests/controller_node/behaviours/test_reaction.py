@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.behaviours.base import Mode, ModeReport
 from controller_node.behaviours.compliance import ComplianceProfile, softened

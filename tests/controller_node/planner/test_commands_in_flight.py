@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import (
     PARAMETERS,

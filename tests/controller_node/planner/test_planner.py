@@ -20,7 +20,7 @@ from actuated_characters.metrics.run_metrics import StateHash
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.planning import foresight, plan_chart
 from actuated_characters.report.sections import CharacterReport
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.controller import Controller
 from controller_node.interface.plan_message import plan_message

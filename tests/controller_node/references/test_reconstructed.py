@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.files.clip import clip_path
 from controller_node.references.files.reconstructed import PLAN, ReconstructedClip

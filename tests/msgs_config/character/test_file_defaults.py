@@ -8,7 +8,7 @@ import pybullet_data
 import pytest
 import trimesh
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.file import AUTOMATIC_GAINS_HZ

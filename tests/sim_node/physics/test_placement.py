@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.clip import ClipReference
 from controller_node.references.files.clip import read_clip

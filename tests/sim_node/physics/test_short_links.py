@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import actuated_characters as ac
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from msgs_config.character.file import shipped_characters
 from msgs_config.character.loading import load_character

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character

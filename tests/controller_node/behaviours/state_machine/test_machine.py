@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.runs.in_process import ticks_in_process
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned_velocities import plan_velocities
-from actuated_characters.runs.planned_wrenches import parse_push
+from actuated_characters.runs.planned.velocities import plan_velocities
+from actuated_characters.runs.planned.wrenches import parse_push
 from controller_node.balance import BalanceGains
 from controller_node.parameters import make_controller
 from controller_node.references.trajectory import TrajectoryPoints

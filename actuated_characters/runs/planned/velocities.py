@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_files import Planned, read_planned
+from actuated_characters.runs.planned.files import Planned, read_planned
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand

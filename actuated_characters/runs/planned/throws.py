@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_files import Planned, read_planned
+from actuated_characters.runs.planned.files import Planned, read_planned
 from controller_node.behaviours.posture import Posture
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character

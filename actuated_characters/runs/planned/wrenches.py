@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_files import Planned, read_planned
+from actuated_characters.runs.planned.files import Planned, read_planned
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays

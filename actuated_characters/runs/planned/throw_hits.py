@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned_throws import PlannedThrow
+from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.arrays import FloatArray
 from sim_node.physics.sphere_sweep import BallAndCharacter
 from sim_node.physics.world import World, WorldSettings
