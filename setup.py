@@ -5,7 +5,14 @@ from glob import glob
 from setuptools import find_packages, setup
 
 PACKAGE = "actuated_characters"
-ROOTS = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
+ROOTS = (
+    "msgs_config",
+    "sim_node",
+    "controller_node",
+    "character_motion",
+    "actuated_characters",
+    "lecture",
+)
 SHARED = {
     "launch": "*.launch.py",
     "config": "*.*",

@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
 from rich.console import Console
 from rich.markup import escape
@@ -30,7 +31,6 @@ from actuated_characters.commands.render import add_render
 from actuated_characters.commands.replay import add_replay
 from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
-from actuated_characters.commands.study import add_study
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_streams
@@ -73,9 +73,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
         *(add_run, add_play, add_view, add_fork, add_reconstruct, add_render, add_replay, add_info),
-        *(add_report, add_compare, add_export, add_motion, add_recover, add_study),
+        *(add_report, add_compare, add_export, add_motion, add_recover),
     ):
         add(commands)
+    # by its name alone: the lecture's figures know this package, which does not know them
+    import_module("lecture.command").add_study(commands)
     add_command(commands, _list, "list", "list the characters and their clips", "", [])
     parameters = add_command(
         commands,

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from actuated_characters.motion.clips.importing import ImportedClip, import_bvh
-from actuated_characters.motion.retargeting.target_body import TargetBody
 from benchmarks.planner.clips import Attempt, Task, attempt
+from character_motion.clips.importing import ImportedClip, import_bvh
+from character_motion.retargeting.target_body import TargetBody
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
 from tests.support.capture_makers import MAKERS, TEN_FILES

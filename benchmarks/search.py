@@ -13,8 +13,8 @@ from benchmarks.support.ratios import Ratio
 from benchmarks.support.yardstick import yardstick_us
 from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from msgs_config.character.loading import load_character
+from msgs_config.clips.reading import read_clip
 
 _STATES = 30  # of a walk, each looked for once
 _LASTING = 0.5  # s, the default of `blend.duration`

@@ -68,7 +68,7 @@ def _compare(options: argparse.Namespace) -> int:
     if output is not None:
         from actuated_characters.report.charts import png
         from actuated_characters.report.comparison.chart import draw_comparisons
-        from actuated_characters.whole_files import write_whole
+        from msgs_config.whole_files import write_whole
 
         write_whole(output, png(draw_comparisons(comparisons)))
         console.print(escape(str(output)), soft_wrap=True)

@@ -9,9 +9,9 @@ import numpy as np
 
 from actuated_characters.reconstruction.search import Progress
 from actuated_characters.reconstruction.tree import Node
-from actuated_characters.whole_files import write_whole
 from controller_node.references.offsets import Offsets
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.whole_files import write_whole
 
 _MALFORMED = (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError)
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node.planner.settings import PREDICTIVE, RECORDED
-from controller_node.references.files.clip import read_clip
 from msgs_config.character.loading import load_character
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
 from sim_node.world_parameters import STEADY_CONTACTS
 

@@ -17,12 +17,12 @@ from actuated_characters.reconstruction.tree import Node
 from actuated_characters.reconstruction.verification import ReconstructionMetrics, verified
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.whole_files import write_whole
-from controller_node.references.files.clip import clip_path
 from controller_node.references.files.reconstructed import PLAN, RECONSTRUCTION
 from controller_node.references.offsets import RecordedPlan
+from msgs_config.clips.reading import clip_path
 from msgs_config.errors import RunError
 from msgs_config.shared_parameters import COMMAND_DELAY
+from msgs_config.whole_files import write_whole
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import yaml
 
 from actuated_characters.bags.format.metadata import BAG, EARLIER_BAG
 from actuated_characters.metrics.run_metrics import Series
-from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError, RunError
+from msgs_config.whole_files import part_of, write_whole, writing
 
 PARAMETERS, LOGS = "parameters", "logs"
 DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes

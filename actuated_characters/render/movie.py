@@ -24,12 +24,13 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters, root_path
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
-from actuated_characters.render.scene import Scene, make_scene, nearest_rows, part_of
+from actuated_characters.render.scene import Scene, make_scene, part_of
 from actuated_characters.render.stills import LONGEST_ARROW, Progress, check_size
 from actuated_characters.render.video import check_video, write_video
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.geometry import rotations
+from msgs_config.nearest_rows import nearest_rows
 
 MOVIE_SIZE = (960, 540)
 

@@ -16,7 +16,6 @@ from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
 _RADIUS = 0.1  # m, of a ball of which it was not recorded
-_EQUAL_DISTANCES = 1e-9  # s: two distances are as good as equal
 _SHORTEST = 0.25  # of the longest arrow: the shortest one
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
@@ -197,20 +196,6 @@ def _norms(acting: WrenchArrays) -> FloatArray:
     """Norms (m,) of the forces, N."""
     norms: FloatArray = np.linalg.norm(acting.wrenches[:, :3], axis=1)
     return norms
-
-
-def nearest_rows(times: FloatArray, wanted: FloatArray) -> IntArray:
-    """The states (p,) nearest to these times (p,) in s, of two that are as near the earlier one.
-
-    `times` are those of the states (t + 1,), in order.
-    """
-    after = np.searchsorted(times, wanted - _EQUAL_DISTANCES).clip(1, max(len(times) - 1, 1))
-    if len(times) == 1:
-        return np.zeros_like(after)
-    before = after - 1
-    nearer = wanted - times[before] <= times[after] - wanted + _EQUAL_DISTANCES
-    rows: IntArray = np.where(nearer, before, after)
-    return rows
 
 
 def part_of(times: FloatArray, start: float, end: float | None) -> tuple[float, float]:

@@ -21,11 +21,12 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
-from actuated_characters.render.scene import Scene, make_scene, nearest_rows, part_of
-from actuated_characters.whole_files import write_whole
+from actuated_characters.render.scene import Scene, make_scene, part_of
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.nearest_rows import nearest_rows
+from msgs_config.whole_files import write_whole
 from sim_node.physics.world import WorldSettings
 
 LONGEST_ARROW = 0.4  # of the extent of the characters

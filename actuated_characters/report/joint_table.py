@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.whole_files import writing
 from msgs_config.errors import RecordingError
+from msgs_config.whole_files import writing
 
 
 def write_joint_states(

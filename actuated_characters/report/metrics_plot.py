@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from actuated_characters.metrics.run_metrics import Series, slider_columns
 from actuated_characters.recorder.run_directory import PLOT, read_metrics
 from actuated_characters.report.charts import Marks, Panel, Timeline, png, series_chart
-from actuated_characters.whole_files import write_whole
 from msgs_config.arrays import FloatArray
+from msgs_config.whole_files import write_whole
 
 _OF_ROOT = ("root_error_mean_m", "root_error_max_m")
 NOMINAL = 1e-3

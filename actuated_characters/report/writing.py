@@ -18,8 +18,8 @@ from actuated_characters.report.page import (
 )
 from actuated_characters.report.robot_sections import POSITIONS, RobotReport
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
-from actuated_characters.whole_files import write_whole
 from msgs_config.errors import RecordingError
+from msgs_config.whole_files import write_whole
 
 PAGE = "index.html"
 

@@ -31,9 +31,9 @@ from actuated_characters.runs.bare_loop import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import RunPlan, make_plan  # noqa: E402
 from actuated_characters.runs.planned.wrenches import parse_pushes_within  # noqa: E402
 from controller_node.parameters import make_controller  # noqa: E402
-from controller_node.references.files.clip import available_clips, read_clip  # noqa: E402
 from msgs_config.character.dynamics import DynamicsModel  # noqa: E402
 from msgs_config.character.loading import load_character  # noqa: E402
+from msgs_config.clips.reading import available_clips, read_clip  # noqa: E402
 from msgs_config.errors import (  # noqa: E402
     ActuatedCharactersError,
     ConfigurationError,

@@ -19,8 +19,8 @@ from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.movie import GhostPlace, Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip
-from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.character.loading import load_character
+from msgs_config.clips.reading import available_clips, read_clip
 
 MOMENTS = 8
 TILE, FRAME, WIDE = (150, 170), (400, 260), (640, 360)  # pixels

@@ -20,8 +20,8 @@ from actuated_characters.commands.common.settings import node_settings  # noqa: 
 from actuated_characters.reconstruction.problem import Problem, duration_of  # noqa: E402
 from actuated_characters.reconstruction.reconstruction import Job, reconstruct  # noqa: E402
 from actuated_characters.reconstruction.search import SearchSettings  # noqa: E402
-from controller_node.references.files.clip import available_clips  # noqa: E402
 from msgs_config.character.loading import load_character  # noqa: E402
+from msgs_config.clips.reading import available_clips  # noqa: E402
 from msgs_config.errors import RunError  # noqa: E402
 
 CHARACTER = "humanoid"

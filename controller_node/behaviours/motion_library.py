@@ -15,10 +15,10 @@ import numpy as np
 
 from controller_node.references.base import Reference
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import available_clips, expand_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, Vector
+from msgs_config.clips.reading import available_clips, expand_clips, read_clip
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.geometry import elementary, fixed_order, rotations
 

@@ -20,10 +20,10 @@ from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.targets import ClipTarget
 from controller_node.planner.settings import NO_PLANNER
-from controller_node.references.files.clip import available_clips
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from controller_node.references.files.clip import available_clips
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE

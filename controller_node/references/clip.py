@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion, ReferenceState
-from controller_node.references.files.clip import ClipFrames, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import ClipFrames, read_clip
 from msgs_config.geometry import rotations
 from msgs_config.parameters import Parameter, Values
 

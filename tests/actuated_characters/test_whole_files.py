@@ -23,8 +23,8 @@ from actuated_characters.render.stills import save_png
 from actuated_characters.report.metrics_plot import plot_metrics
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.wrenches import PlannedPush
-from actuated_characters.whole_files import part_of, write_whole, writing
 from msgs_config.errors import RecordingError
+from msgs_config.whole_files import part_of, write_whole, writing
 from tests.support.limits import file_size_limit
 from tests.support.ros import Processes
 

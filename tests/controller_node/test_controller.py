@@ -7,12 +7,12 @@ import pytest
 
 from controller_node.controller import Controller
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ClockError
 from msgs_config.messages.state import StampedState
 from sim_node.physics.simulation import Simulation

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.studies.theory import second_order
-from actuated_characters.studies.theory.second_order import critical_damping, identify
 from controller_node.controller import Controller
 from controller_node.effort_series import write_effort_series
+from lecture.theory import second_order
+from lecture.theory.second_order import critical_damping, identify
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState

@@ -9,7 +9,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 PROJECT = Path(__file__).parents[2]
-PACKAGES = ("msgs_config", "sim_node", "controller_node", "actuated_characters")
+PACKAGES = (
+    "msgs_config",
+    "sim_node",
+    "controller_node",
+    "character_motion",
+    "actuated_characters",
+    "lecture",
+)
 ROS_NAMES = re.compile(
     r"rclpy|rpyutils|rosidl_\w+|ament_\w+|builtin_interfaces|rcl_interfaces|\w+_(msgs|srvs)"
 )

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 from controller_node import parameters as for_controller
 from controller_node.references.factory import make_motion
-from controller_node.references.files.clip import available_clips
+from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.state import StampedState

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from actuated_characters.motion.export.sources import of_clip
+from actuated_characters.export.sources import of_clip
 from tests.support.physics import character
 from tests.support.rotation_matrices import about, euler, half_way, matrices
 

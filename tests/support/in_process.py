@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from actuated_characters.studies.catalogue import load_study
-from actuated_characters.studies.framework.result import StudyResult
-from actuated_characters.studies.framework.runner import Runner
-from actuated_characters.studies.framework.study import RunResult, RunSpec
+from lecture.catalogue import load_study
+from lecture.framework.result import StudyResult
+from lecture.framework.runner import Runner
+from lecture.framework.study import RunResult, RunSpec
 
 
 class InProcessRunner(Runner):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from actuated_characters.motion.export.trajectories import (
+from character_motion.export.trajectories import (
     CharacterTrajectory,
     LinkPoses,
     Trajectories,

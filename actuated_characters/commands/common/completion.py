@@ -34,8 +34,8 @@ def _characters(prefix: str, **ignored: object) -> Iterable[str]:
 def _clips(prefix: str, parsed_args: argparse.Namespace, **ignored: object) -> Iterable[str]:
     from argcomplete.completers import FilesCompleter
 
-    from controller_node.references.files.clip import available_clips
     from msgs_config.character.loading import load_character
+    from msgs_config.clips.reading import available_clips
 
     return [*available_clips(load_character(parsed_args.character)), *FilesCompleter()(prefix)]
 

@@ -46,9 +46,9 @@ def print_characters(console: Console) -> None:
 
 
 def _characters() -> Sequence[tuple[str, ...]]:
-    from controller_node.references.files.clip import available_clips
     from msgs_config.character.file import shipped_characters
     from msgs_config.character.loading import load_character
+    from msgs_config.clips.reading import available_clips
 
     rows = []
     for name in shipped_characters():

@@ -16,7 +16,7 @@ from actuated_characters.commands.motion.files import (
 )
 
 if TYPE_CHECKING:  # it takes a while to import
-    from actuated_characters.motion.clips.motion_clip import MotionClip
+    from character_motion.clips.motion_clip import MotionClip
     from msgs_config.character.model import Character
 
     Edit = Callable[[argparse.Namespace, MotionClip], MotionClip]
@@ -104,8 +104,8 @@ def _edited(
     from dataclasses import replace
 
     from actuated_characters.commands.motion.info import target_of
-    from actuated_characters.motion.clips.motion_clip import read_motion_clip
-    from actuated_characters.motion.clips.quality import measure_quality
+    from character_motion.clips.motion_clip import read_motion_clip
+    from character_motion.clips.quality import measure_quality
 
     clip = edit(options, read_motion_clip(character, conversion.source))
     target = target_of(character)
@@ -126,32 +126,32 @@ def _report(conversion: Conversion, clip: "MotionClip") -> None:
 
 
 def _trim(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
-    from actuated_characters.motion.clips.editing import trim
+    from character_motion.clips.editing import trim
 
     return trim(clip, 0.0 if options.start is None else options.start, options.end)
 
 
 def _loop(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
-    from actuated_characters.motion.clips.editing import loop
+    from character_motion.clips.editing import loop
 
     return loop(clip, options.start, options.end)
 
 
 def _mirror(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
-    from actuated_characters.motion.clips.editing import mirror
+    from character_motion.clips.editing import mirror
 
     del options
     return mirror(clip)
 
 
 def _blend(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
-    from actuated_characters.motion.clips.editing import blend
-    from actuated_characters.motion.clips.motion_clip import read_motion_clip
+    from character_motion.clips.editing import blend
+    from character_motion.clips.motion_clip import read_motion_clip
 
     return blend(clip, read_motion_clip(clip.character, options.next), options.over)
 
 
 def _speed(options: argparse.Namespace, clip: "MotionClip") -> "MotionClip":
-    from actuated_characters.motion.clips.editing import change_speed
+    from character_motion.clips.editing import change_speed
 
     return change_speed(clip, options.factor)

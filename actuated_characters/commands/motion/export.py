@@ -13,11 +13,11 @@ from actuated_characters.commands.common.settings import (
     print_remarks,
     robot_source,
 )
-from actuated_characters.whole_files import write_whole
 from msgs_config.errors import ConfigurationError
+from msgs_config.whole_files import write_whole
 
 if TYPE_CHECKING:  # it takes a while to import
-    from actuated_characters.motion.export.trajectories import Trajectories
+    from character_motion.export.trajectories import Trajectories
     from msgs_config.arrays import FloatArray
 
     Make = Callable[[argparse.Namespace, Trajectories, FloatArray, Callable[[int], None]], bytes]
@@ -83,7 +83,7 @@ def _export(options: argparse.Namespace) -> None:
         if getattr(options, name):
             kind = "glTF" if suffix == _BVH else "BVH"
             raise ConfigurationError(f"--{name} is of {kind}; {options.output} is none")
-    from actuated_characters.motion.export.sources import read_source
+    from actuated_characters.export.sources import read_source
     from actuated_characters.report.joint_table import check_output
 
     check_output(options.output, overwrite=options.overwrite)
@@ -116,7 +116,7 @@ def _gltf(
     times: "FloatArray",
     progress: Callable[[int], None],
 ) -> bytes:
-    from actuated_characters.motion.export.gltf_scene import make_document
+    from actuated_characters.export.gltf_scene import make_document
 
     document = make_document(motion, times, ground=options.ground, progress=progress)
     is_binary = options.output.suffix.lower() == _GLB
@@ -129,8 +129,8 @@ def _bvh(
     times: "FloatArray",
     progress: Callable[[int], None],
 ) -> bytes:
-    from actuated_characters.motion.bvh.writing import bvh_text
-    from actuated_characters.motion.export.bvh_motion import to_bvh
+    from character_motion.bvh.writing import bvh_text
+    from character_motion.export.bvh_motion import to_bvh
 
     (trajectory,) = motion.characters
     rate = motion.rate if options.fps is None else options.fps

@@ -23,7 +23,7 @@ def find_files(folder: Path, suffixes: Sequence[str]) -> list[Path]:
     Raises:
         ConfigurationError: there is none.
     """
-    from controller_node.references.files.clip import is_note
+    from msgs_config.clips.reading import is_note
 
     found = (p for p in folder.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
     files = sorted(p for p in found if not is_note(p))

@@ -21,13 +21,13 @@ from actuated_characters.commands.motion.files import (
     make_folder_of,
     plan_conversions,
 )
-from actuated_characters.motion.bvh.axes_and_units import AXES, UNITS
+from character_motion.bvh.axes_and_units import AXES, UNITS
 from msgs_config.errors import ClipError, RecordingError
 
 if TYPE_CHECKING:  # it takes a while to import
-    from actuated_characters.motion.clips.importing import ImportedClip
-    from actuated_characters.motion.retargeting.retargeting import RetargetingSettings
-    from actuated_characters.motion.retargeting.target_body import TargetBody
+    from character_motion.clips.importing import ImportedClip
+    from character_motion.retargeting.retargeting import RetargetingSettings
+    from character_motion.retargeting.target_body import TargetBody
 
 _SUFFIX, _BVH = ".json", (".bvh",)
 
@@ -75,9 +75,9 @@ def add_motion_import(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _import(options: argparse.Namespace) -> int:
-    from actuated_characters.motion.retargeting.retargeting import RetargetingSettings
-    from actuated_characters.motion.retargeting.skeleton_map import GivenJoints, read_map
-    from actuated_characters.motion.retargeting.target_body import TargetBody
+    from character_motion.retargeting.retargeting import RetargetingSettings
+    from character_motion.retargeting.skeleton_map import GivenJoints, read_map
+    from character_motion.retargeting.target_body import TargetBody
     from msgs_config.character.loading import load_character
 
     conversions = plan_conversions(
@@ -117,7 +117,7 @@ def _convert(
     target: "TargetBody",
     settings: "RetargetingSettings",
 ) -> "ImportedClip":
-    from actuated_characters.motion.clips.importing import import_bvh
+    from character_motion.clips.importing import import_bvh
 
     path, totals = Path(conversion.source), [1]
     with progress_bar(path.name, 1, "frames", transient=True) as bar:
@@ -137,7 +137,7 @@ def _convert(
     make_folder_of(conversion.output)
     made.clip.write(conversion.output)
     if not options.no_picture:
-        from actuated_characters.motion.retargeting.pictures import comparison_strip
+        from actuated_characters.commands.motion.pictures import comparison_strip
         from actuated_characters.render.stills import save_png
 
         save_png(comparison_strip(target, made.retargeted), _picture(conversion))

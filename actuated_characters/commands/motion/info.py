@@ -15,8 +15,8 @@ from actuated_characters.commands.motion.files import find_files
 from msgs_config.errors import ClipError
 
 if TYPE_CHECKING:  # it takes a while to import
-    from actuated_characters.motion.clips.motion_clip import MotionClip
-    from actuated_characters.motion.retargeting.target_body import TargetBody
+    from character_motion.clips.motion_clip import MotionClip
+    from character_motion.retargeting.target_body import TargetBody
     from msgs_config.character.model import Character
 
 _BVH, _CLIPS = ".bvh", (".json", ".txt")
@@ -76,16 +76,16 @@ def _folder(options: argparse.Namespace, path: Path, character: "Character") -> 
 def _facts(character: "Character", source: str) -> dict[str, Any]:
     if Path(source).suffix.lower() == _BVH:
         return dict(_bvh_facts(Path(source)))
-    from actuated_characters.motion.clips.motion_clip import read_motion_clip
+    from character_motion.clips.motion_clip import read_motion_clip
 
     clip = read_motion_clip(character, source)
     return dict(_clip_facts(clip))
 
 
 def _bvh_facts(path: Path) -> Iterator[tuple[str, Any]]:
-    from actuated_characters.motion.bvh.reading import read_bvh
-    from actuated_characters.motion.retargeting.plausibility import doubts_of_human
-    from actuated_characters.motion.retargeting.retargeting import (
+    from character_motion.bvh.reading import read_bvh
+    from character_motion.retargeting.plausibility import doubts_of_human
+    from character_motion.retargeting.retargeting import (
         RetargetingSettings,
         read_body,
     )
@@ -110,7 +110,7 @@ def _bvh_facts(path: Path) -> Iterator[tuple[str, Any]]:
 
 
 def _clip_facts(clip: "MotionClip") -> Iterator[tuple[str, Any]]:
-    from actuated_characters.motion.clips.quality import measure_quality
+    from character_motion.clips.quality import measure_quality
 
     yield "frames", len(clip.times)
     yield "duration", f"{clip.duration:.3f} s"
@@ -132,7 +132,7 @@ def _clip_facts(clip: "MotionClip") -> Iterator[tuple[str, Any]]:
 
 def target_of(character: "Character") -> "TargetBody | None":
     """The character as one that stands on legs; None if it is none."""
-    from actuated_characters.motion.retargeting.target_body import TargetBody
+    from character_motion.retargeting.target_body import TargetBody
 
     try:
         return TargetBody(character)

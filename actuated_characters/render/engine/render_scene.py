@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.render.engine.camera_pose import CameraPose, PixelRegion, Size
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
-from actuated_characters.render.engine.surfaces import Surface, arrow_surface, round_surface
+from actuated_characters.render.engine.surfaces import arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.c_library import c_numbers, captured_output
@@ -21,6 +21,7 @@ from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+from msgs_config.geometry.surface import Surface
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
 

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.render.engine.surfaces import Surface, round_surface
+from actuated_characters.render.engine.surfaces import round_surface
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
 from msgs_config.extras import require_extra
+from msgs_config.geometry.surface import Surface
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _SIDES = np.array(  # corners of each, counterclockwise from outside

@@ -1,25 +1,17 @@
 """Round surfaces as triangles: the engine's own have so few that a sphere has corners."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
-from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Shape, ShapeType
+from msgs_config.geometry.surface import Surface
 
 HEAD_WIDTH = 3.0  # of an arrow, in diameters of its shaft
 
 _AROUND = 24  # faces around the axis
 _ALONG_ARC = 7  # points of a quarter of a circle
-
-
-class Surface(NamedTuple):
-    """Triangles with the corners counterclockwise, seen from outside."""
-
-    vertices: FloatArray  # (m, 3), m
-    normals: FloatArray  # (m, 3), outwards, of length one
-    triangles: IntArray  # (k, 3), which vertices
 
 
 def round_surface(shape: Shape) -> Surface:

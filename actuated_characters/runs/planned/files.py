@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from actuated_characters.whole_files import write_whole
 from msgs_config.errors import CommandError, RecordingError
+from msgs_config.whole_files import write_whole
 
 T = TypeVar("T")
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS
 from controller_node.control_laws import LAWS
-from controller_node.references.files.clip import available_clips
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
+from msgs_config.clips.reading import available_clips
 from msgs_config.messages import topics
 
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE

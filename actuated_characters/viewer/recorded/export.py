@@ -13,8 +13,8 @@ from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.video import write_video
 from actuated_characters.viewer.drawing.scene import BACKGROUND
 from actuated_characters.viewer.web.server import ViewerServer
-from actuated_characters.whole_files import write_whole
 from msgs_config.errors import RecordingError
+from msgs_config.whole_files import write_whole
 
 FPS = 30  # of films
 

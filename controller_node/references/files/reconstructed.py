@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from controller_node.references.files.clip import ClipFile
 from controller_node.references.offsets import Offsets, RecordedPlan, knot_before
 from msgs_config.character.layout import JointLayout
+from msgs_config.clips.reading import ClipFile
 from msgs_config.errors import ClipError
 
 PLAN, RECONSTRUCTION = "Plan", "Reconstruction"

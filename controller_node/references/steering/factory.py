@@ -4,12 +4,12 @@ import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import expand_clips, read_clip
 from controller_node.references.steering.gait import Gait, cycle_of, standing_cycle
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import expand_clips, read_clip
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter, Values
 from msgs_config.shared_parameters import RATE

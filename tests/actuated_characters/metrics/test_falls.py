@@ -17,7 +17,7 @@ from actuated_characters.metrics.falls import (
     tilts,
 )
 from actuated_characters.metrics.run_metrics import Measurement, Tick
-from actuated_characters.studies.framework.study import RunResult, RunSpec, plan_push
+from lecture.framework.study import RunResult, RunSpec, plan_push
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Placement, UrdfOptions
 from msgs_config.errors import CharacterError

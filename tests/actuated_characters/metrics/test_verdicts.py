@@ -11,7 +11,7 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from actuated_characters.studies.framework.study import RunResult, RunSpec, plan_push
+from lecture.framework.study import RunResult, RunSpec, plan_push
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from tests.support.in_process import InProcessRunner

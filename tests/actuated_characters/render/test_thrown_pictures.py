@@ -15,7 +15,7 @@ from actuated_characters.report.reactions import (
     throw_marks,
     thrown_line,
 )
-from actuated_characters.studies.framework.study import RunSpec
+from lecture.framework.study import RunSpec
 from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
 from msgs_config.messages.throw import ProjectileThrow
 from tests.support.in_process import InProcessRunner

@@ -14,9 +14,9 @@ from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
-from actuated_characters.studies.athletics.measures import longest_flight
 from benchmarks.athletics.trial import Trial, moments
 from controller_node.behaviours.state_machine.file import read_machine
+from lecture.athletics.measures import longest_flight
 from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
 from tests.support.runs import Run, run_plan, summary_of

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from controller_node.behaviours.bounding_spheres import BoundingSpheres
 from controller_node.behaviours.hit_detection import HitDetector, beyond_cone
-from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
+from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings

@@ -8,10 +8,10 @@ import pytest
 
 from controller_node.behaviours.motion_library import MotionLibrary, Window
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from tests.support.physics import character
 

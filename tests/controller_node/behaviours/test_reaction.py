@@ -13,12 +13,12 @@ from controller_node.behaviours.compliance import ComplianceProfile, softened
 from controller_node.control_laws import GainArrays, TrackingInput
 from controller_node.controller import Controller
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from controller_node.references.trajectory import points_of_lists
 from controller_node.references.transformed import PlanarTransform
 from controller_node.strength import strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState

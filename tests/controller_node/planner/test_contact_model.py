@@ -16,10 +16,10 @@ from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.clips.reading import read_clip
 from msgs_config.geometry import rotations
 from msgs_config.parameters import resolve
 from sim_node.physics.passive_forces import PassiveForces

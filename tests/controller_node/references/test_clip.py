@@ -11,8 +11,8 @@ import pytest
 
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
+from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 from tests.support.physics import character, link_poses, still_world

@@ -11,13 +11,13 @@ from controller_node.references import keyframes as module
 from controller_node.references.base import Motion, Reference, ReferenceState
 from controller_node.references.clip import ClipReference
 from controller_node.references.factory import MOTION_PARAMETERS, make_motion
-from controller_node.references.files.clip import read_clip
 from controller_node.references.files.keyframes import read_keyframes
 from controller_node.references.hold import HoldReference
 from controller_node.references.keyframes import KEYFRAMES_DIRECTORY, KeyframesReference
 from controller_node.references.signals import SineReference, StepReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.parameters import resolve
 from tests.support.physics import FLOATING_TURNED_FRAMES, character

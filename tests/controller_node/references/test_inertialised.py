@@ -9,12 +9,12 @@ from controller_node.behaviours.targets import ClipTarget
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.clip import ClipReference
 from controller_node.references.curve import Curve
-from controller_node.references.files.clip import read_clip
 from controller_node.references.hold import HoldReference
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import read_clip
 from msgs_config.geometry import rotations
 from tests.support.motion import (
     FLOATING,

@@ -7,10 +7,10 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.geometry import rotations
 from tests.support.physics import character
 

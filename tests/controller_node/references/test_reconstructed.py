@@ -10,9 +10,9 @@ import pytest
 
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
-from controller_node.references.files.clip import clip_path
 from controller_node.references.files.reconstructed import PLAN, ReconstructedClip
 from controller_node.references.offsets import Offsets, RecordedPlan
+from msgs_config.clips.reading import clip_path
 from msgs_config.errors import ClipError, ConfigurationError
 from tests.support.physics import character
 

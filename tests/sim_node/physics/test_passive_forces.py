@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import actuated_characters as ac
-from controller_node.references.files.clip import available_clips, read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, Joint, SoftLimit
+from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.geometry import rotations
 from sim_node.physics.passive_forces import (
     PassedBound,

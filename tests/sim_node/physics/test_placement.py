@@ -6,9 +6,9 @@ import pytest
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 from msgs_config.shared_parameters import placed

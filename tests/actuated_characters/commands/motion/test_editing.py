@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from actuated_characters.cli import main
-from controller_node.references.files.clip import read_clip
+from msgs_config.clips.reading import read_clip
 from tests.support.physics import character
 
 

@@ -8,11 +8,11 @@ import pytest
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from actuated_characters.motion.bvh.kinematics import forward_kinematics
-from actuated_characters.motion.bvh.reading import read_bvh
-from actuated_characters.motion.export.sources import of_recordings, read_source
-from controller_node.references.files.clip import clip_path
+from actuated_characters.export.sources import of_recordings, read_source
+from character_motion.bvh.kinematics import forward_kinematics
+from character_motion.bvh.reading import read_bvh
 from msgs_config.character.dynamics import still_model
+from msgs_config.clips.reading import clip_path
 from msgs_config.messages import topics
 from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states, write_bag
 from tests.support.eventful import Eventful, eventful_run, write_timed

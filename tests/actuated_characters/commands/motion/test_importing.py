@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from actuated_characters.cli import main
-from actuated_characters.motion.bvh.kinematics import forward_kinematics
-from actuated_characters.motion.bvh.reading import read_bvh
-from actuated_characters.motion.clips.motion_clip import read_motion_clip
+from character_motion.bvh.kinematics import forward_kinematics
+from character_motion.bvh.reading import read_bvh
+from character_motion.clips.motion_clip import read_motion_clip
 from tests.support.capture_makers import MAKERS
 from tests.support.captures import capture
 from tests.support.physics import character

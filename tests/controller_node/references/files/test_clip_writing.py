@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller_node.references.files.clip import read_clip
-from controller_node.references.files.clip_writing import clip_rows, clip_text
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Placement
+from msgs_config.clips.reading import read_clip
+from msgs_config.clips.writing import clip_rows, clip_text
 from tests.support.physics import character
 
 

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller_node.references.clip import ClipReference
-from controller_node.references.files.clip import read_clip
 from controller_node.references.steering.gait import Gait, GaitCycle, cycle_of, standing_cycle
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 from tests.support.physics import character

@@ -1,0 +1,1 @@
+"""Recordings and clips as files of other programs."""

@@ -1,0 +1,140 @@
+"""A scene of characters and balls that move, as glTF: rigid links, each a node below its parent."""
+
+import numpy as np
+
+from actuated_characters.render.engine.shape_meshes import surface_of
+from actuated_characters.render.engine.visual_shapes import drawn_shapes
+from character_motion.bvh.kinematics import continuous
+from character_motion.export.trajectories import (
+    BallTrajectory,
+    CharacterTrajectory,
+    LinkPoses,
+    Progress,
+    Trajectories,
+)
+from character_motion.export.upright import UPRIGHT_XYZW
+from character_motion.gltf.document import GltfDocument
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Pose, Quadruple, Shape, ShapeType
+from msgs_config.geometry import rotations
+from msgs_config.geometry.surface import Surface
+
+_GROUND = Shape(ShapeType.BOX, (40.0, 40.0, 0.1), Pose((0.0, 0.0, -0.05)), (0.8, 0.82, 0.85, 1.0))
+_BALL_RGBA: Quadruple = (0.88, 0.37, 0.16, 1.0)
+_GENERATOR = "actuated_characters"
+_TURNING = (JointType.REVOLUTE, JointType.SPHERICAL, JointType.FLOATING)
+_SLIDING = (JointType.PRISMATIC, JointType.FLOATING)
+
+
+def make_document(
+    motion: Trajectories,
+    times: FloatArray,
+    *,
+    ground: bool = False,
+    progress: Progress | None = None,
+) -> GltfDocument:
+    """The scene at some times (f,) in s, of which the first one becomes 0.
+
+    Args:
+        motion: What moves.
+        times: In s, rising.
+        ground: Whether the plane z = 0 is there, too.
+        progress: Is told the frames so far, of each character one after the other.
+
+    Raises:
+        CharacterError: a mesh cannot be used; names its file.
+    """
+    builder = _SceneBuilder(times)
+    if ground:
+        builder.add_ground()
+    for number, trajectory in enumerate(motion.characters):
+        before = number * len(times)
+        told = None if progress is None else (lambda done, b=before: progress(b + done))
+        poses = motion.link_poses(trajectory, times, told)
+        builder.add_character(trajectory, poses, several=len(motion.characters) > 1)
+    for ball in motion.sampled_balls(times):
+        builder.add_ball(ball)
+    return builder.document
+
+
+class _SceneBuilder:
+    """Adds what is to be seen to a document, below one node that turns z up to y up."""
+
+    def __init__(self, times: FloatArray) -> None:
+        self.document = GltfDocument(_GENERATOR)
+        self._seconds = times - times[0]
+        self._times = self.document.add_times(self._seconds)
+        self._world = self.document.add_node("world", rotation_xyzw=UPRIGHT_XYZW)
+        self._meshes: dict[tuple[Shape, ...], int] = {}
+
+    def add_ground(self) -> None:
+        self.document.add_node("ground", self._world, self._mesh("ground", (_GROUND,)))
+
+    def add_character(
+        self, trajectory: CharacterTrajectory, poses: LinkPoses, *, several: bool
+    ) -> None:
+        """Add its links; those of several characters have the character's name before theirs."""
+        links = trajectory.character.links
+        root, prefix = self._world, ""
+        if several:
+            root = self.document.add_node(trajectory.name, self._world)
+            prefix = f"{trajectory.name}_"
+        nodes = [root]
+        for row, shapes in enumerate(drawn_shapes(trajectory.character)):
+            link, name = links[row], prefix + links[row].name
+            origins, turns = _in_parent(poses, row, link.parent)
+            mesh = self._mesh(name, shapes) if shapes else None
+            node = self.document.add_node(name, nodes[link.parent + 1], mesh, origins[0], turns[0])
+            nodes.append(node)
+            if link.joint.type in _SLIDING:
+                self.document.animate(node, "translation", self._times, origins)
+            if link.joint.type in _TURNING:
+                self.document.animate(node, "rotation", self._times, turns)
+
+    def add_ball(self, ball: BallTrajectory) -> None:
+        """Add a ball, of no size while it is not there, which is how glTF hides a node."""
+        there = np.isfinite(ball.centres[:, 0])
+        if not there.any():
+            return
+        rows = np.maximum.accumulate(np.where(there, np.arange(len(there)), np.argmax(there)))
+        centres, turns = ball.centres[rows], continuous(ball.turns_xyzw[rows])
+        sizes = np.repeat(there.astype(float)[:, np.newaxis], 3, axis=1)
+        shape = Shape(ShapeType.SPHERE, (ball.radius,), color_rgba=_BALL_RGBA)
+        node = self.document.add_node(
+            ball.name,
+            self._world,
+            self._mesh(ball.name, (shape,)),
+            centres[0],
+            turns[0],
+            sizes[0],
+        )
+        self.document.animate(node, "translation", self._times, centres)
+        self.document.animate(node, "rotation", self._times, turns)
+        if not there.all():
+            changes = np.flatnonzero(np.diff(there, prepend=not there[0]))
+            appears = self.document.add_times(self._seconds[changes])
+            self.document.animate(node, "scale", appears, sizes[changes], steps=True)
+
+    def _mesh(self, name: str, shapes: tuple[Shape, ...]) -> int:
+        if shapes not in self._meshes:
+            surfaces = [(_placed(shape), shape.color_rgba) for shape in shapes]
+            self._meshes[shapes] = self.document.add_mesh(name, surfaces)
+        return self._meshes[shapes]
+
+
+def _placed(shape: Shape) -> Surface:
+    """The surface of a shape in its link's frame."""
+    surface, turn = surface_of(shape), np.array(shape.pose.orientation_xyzw)
+    vertices = rotations.rotate(turn, surface.vertices) + np.array(shape.pose.position)
+    return Surface(vertices, rotations.rotate(turn, surface.normals), surface.triangles)
+
+
+def _in_parent(poses: LinkPoses, row: int, parent: int) -> tuple[FloatArray, FloatArray]:
+    """Origins (f, 3) in m and turns (f, 4) of a link in its parent's frame; -1 is the world."""
+    origins, turns = poses.origins[:, row], poses.turns_xyzw[:, row]
+    if parent >= 0:
+        back = rotations.conjugate(poses.turns_xyzw[:, parent])
+        origins = rotations.rotate(back, origins - poses.origins[:, parent])
+        turns = rotations.multiply(back, turns)
+    return origins, continuous(rotations.normalised(turns))

@@ -1,1 +1,0 @@
-"""Runs, bags and clips as files of other programs."""

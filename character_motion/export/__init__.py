@@ -1,0 +1,1 @@
+"""Motion of a character as joints and links of other formats have it."""
