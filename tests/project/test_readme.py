@@ -17,7 +17,10 @@ from tests.support import parameter_page, topic_table
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-ROOMS = "msgs_config|sim_node|controller_node|actuated_characters|tests|benchmarks|examples|config"
+ROOMS = (
+    "msgs_config|sim_node|controller_node|character_motion|actuated_characters|lecture|tests|"
+    "benchmarks|examples|config"
+)
 
 
 def test_every_command_line_of_a_page_is_one_that_the_parser_takes():
