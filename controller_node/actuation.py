@@ -2,7 +2,7 @@
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 
 _NOTHING = (0.0, 0.0, 0.0)
 
@@ -18,7 +18,7 @@ def describe_actuation(actuators: int, degrees_of_freedom: int) -> dict[str, int
 
 def net_wrench(
     layout: JointLayout, position: FloatArray, effort: FloatArray
-) -> tuple[frames.Triple, frames.Triple]:
+) -> tuple[scalars.Vector, scalars.Vector]:
     """Force in N and torque in N m of all efforts (n,) on the character as a whole, at (n,).
 
     World axes, the torque about the base link's origin. A joint's torque acts on the child and its
@@ -28,5 +28,5 @@ def net_wrench(
     if not layout.has_floating_base:
         return _NOTHING, _NOTHING
     fx, fy, fz, *torque_in_base = effort[:6].tolist()
-    turn = frames.axes(frames.quaternion(position[3:6].tolist()))
-    return (fx, fy, fz), frames.to_parent(turn, torque_in_base)
+    turn = scalars.axes(scalars.exp(position[3:6].tolist()))
+    return (fx, fy, fz), scalars.to_parent(turn, torque_in_base)

@@ -17,7 +17,7 @@ from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, UrdfOptions
-from msgs_config.geometry import fixed_order, frames
+from msgs_config.geometry import fixed_order, scalars
 from msgs_config.messages.state import StampedState
 
 Terrain: TypeAlias = UrdfOptions | None
@@ -62,10 +62,10 @@ class Assessment:
         base, position, velocity, error, _ = self._parts
         seen = np.empty(self.size)
         if self._floats:
-            axes = frames.axes(frames.quaternion(state.position[3:_BASE].tolist()))
+            axes = scalars.axes(scalars.exp(state.position[3:_BASE].tolist()))
             seen[0] = state.position[2]
-            seen[1:4] = frames.to_child(axes, _DOWN)
-            seen[4:7] = frames.to_child(axes, state.velocity[:3].tolist())
+            seen[1:4] = scalars.to_child(axes, _DOWN)
+            seen[4:7] = scalars.to_child(axes, state.velocity[:3].tolist())
             seen[7:base] = state.velocity[3:_BASE]
         seen[base:position] = state.position[self._joints]
         seen[position:velocity] = state.velocity[self._joints]

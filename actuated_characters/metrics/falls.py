@@ -14,7 +14,7 @@ from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import elementary, fixed_order, rotations
-from msgs_config.geometry.single_rotations import Vector, exp, rotate
+from msgs_config.geometry.scalars import Vector, exp, rotate
 from sim_node.physics.ground import Ground
 
 FALLEN_HEIGHT = 0.5

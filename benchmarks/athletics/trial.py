@@ -24,8 +24,8 @@ from controller_node.references.steering.reference import Course, SteeredReferen
 from msgs_config.arrays import FloatArray
 from msgs_config.character.effort_limits import EffortLimits
 from msgs_config.errors import SimulationError
-from msgs_config.geometry.single_rotations import (
-    QuaternionXyzw,
+from msgs_config.geometry.scalars import (
+    Quaternion,
     about_x,
     conjugate,
     exp,
@@ -153,7 +153,7 @@ def walked(
     return Walk(last, fell, ahead * mean, wanted * mean, aside * mean, turned * mean, effort * mean)
 
 
-def _against_standing(position: FloatArray) -> QuaternionXyzw:
+def _against_standing(position: FloatArray) -> Quaternion:
     """How the humanoid's root (n,) is turned against standing, facing along x."""
     x, y, z = position[3:6].tolist()
     return multiply(exp((x, y, z)), conjugate(about_x(0.5 * math.pi)))

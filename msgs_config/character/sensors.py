@@ -7,11 +7,11 @@ from enum import Enum
 from pathlib import Path
 
 from msgs_config.errors import CharacterError, one_of
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.mappings import MappingReader
 
-_ZERO: frames.Triple = (0.0, 0.0, 0.0)
+_ZERO: scalars.Vector = (0.0, 0.0, 0.0)
 _WORLD = "world"  # a frame that is there for every character
 _FARTHEST = 1e3  # m from the link's origin
 _LARGEST_ANGLE = 2.0 * math.pi  # rad; degrees are mostly more
@@ -43,10 +43,10 @@ _QUANTITIES = {
 class Noise:
     """What is added to a measured vector, per axis of the sensor, in the vector's unit."""
 
-    stddev: frames.Triple = _ZERO  # of white noise, drawn at each tick
-    bias: frames.Triple = _ZERO  # constant
-    bias_stddev: frames.Triple = _ZERO  # of a constant bias, drawn once from the seed
-    bias_walk: frames.Triple = _ZERO  # of a bias that walks, after 1 s; it grows with its root
+    stddev: scalars.Vector = _ZERO  # of white noise, drawn at each tick
+    bias: scalars.Vector = _ZERO  # constant
+    bias_stddev: scalars.Vector = _ZERO  # of a constant bias, drawn once from the seed
+    bias_walk: scalars.Vector = _ZERO  # of a bias that walks, after 1 s; it grows with its root
 
     def __bool__(self) -> bool:
         return self != Noise()
@@ -59,8 +59,8 @@ class Sensor:
     name: str
     type: SensorType
     link: str
-    position: frames.Triple = _ZERO  # m
-    orientation_xyzw: frames.Quaternion = IDENTITY_XYZW
+    position: scalars.Vector = _ZERO  # m
+    orientation_xyzw: scalars.Quaternion = IDENTITY_XYZW
     noise: dict[str, Noise] = field(default_factory=dict)
     """By the measured quantity; those without noise are left out."""
 
@@ -119,7 +119,7 @@ def _read_type(reader: MappingReader, sensor_type: SensorType) -> Iterator[Senso
             sensor_type,
             each.text("link"),
             _vector(each.numbers("xyz", 3, (-_FARTHEST, _FARTHEST), [0.0] * 3)),
-            frames.of_roll_pitch_yaw(
+            scalars.of_roll_pitch_yaw(
                 each.numbers("rpy", 3, (-_LARGEST_ANGLE, _LARGEST_ANGLE), [0.0] * 3)
             ),
             {key: value for key, value in read.items() if value},
@@ -131,7 +131,7 @@ def _read_noise(reader: MappingReader) -> Noise:
     return Noise(**{key: _per_axis(reader, key) for key in reader.content})
 
 
-def _per_axis(reader: MappingReader, key: str) -> frames.Triple:
+def _per_axis(reader: MappingReader, key: str) -> scalars.Vector:
     """A number for each axis: a list of three, or one for all; a deviation is not negative."""
     bounds = (-_LARGEST_NOISE if key == "bias" else 0.0, _LARGEST_NOISE)
     if isinstance(reader.content[key], list):
@@ -139,6 +139,6 @@ def _per_axis(reader: MappingReader, key: str) -> frames.Triple:
     return (reader.number(key, minimum=bounds[0], maximum=bounds[1]),) * 3
 
 
-def _vector(numbers: tuple[float, ...]) -> frames.Triple:
+def _vector(numbers: tuple[float, ...]) -> scalars.Vector:
     x, y, z = numbers
     return (x, y, z)

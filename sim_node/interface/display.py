@@ -11,7 +11,7 @@ from msgs_config.bus.node import BusNode, Publisher
 from msgs_config.bus.publishing import has_subscribers
 from msgs_config.character.urdf.described_joints import DescribedJoints
 from msgs_config.character.urdf.robot_description import robot_description
-from msgs_config.geometry import fixed_order, frames, rotations
+from msgs_config.geometry import fixed_order, rotations, scalars
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder, encode_string
 from msgs_config.messages.joint_state import JointStateEncoder
@@ -71,8 +71,8 @@ class DisplayPublishers:
         self._odometry_doubles = np.zeros(_ODOMETRY_DOUBLES)
         self._odometry_doubles[_VARIANCES] = _EXACT_VARIANCE
         x, y, z, w = self._joints.turn_xyzw.tolist()
-        self._into_link = frames.conjugate((x, y, z, w))
-        self._link_in_base = frames.axes((x, y, z, w))
+        self._into_link = scalars.conjugate((x, y, z, w))
+        self._link_in_base = scalars.axes((x, y, z, w))
         self._joint_encoder = JointStateEncoder([joint.name for joint in self._joints.moving])
         self._markers = MarkerEncoder(whole)
 
@@ -139,14 +139,14 @@ class DisplayPublishers:
     def _encode_odometry(self) -> bytes:
         """The base in the frame of `odom`, its twist in its own."""
         origin, turn = self._character.base_frame()
-        base_turn = frames.product(turn.tolist(), self._into_link)
+        base_turn = scalars.multiply(turn.tolist(), self._into_link)
         values = self._odometry_doubles
         values[_POSITION], values[_ORIENTATION] = origin, base_turn
         if self._character.layout.has_floating_base:
             velocity = self._character.state.velocity.tolist()
-            into_base = frames.axes(frames.conjugate(base_turn))
-            values[_LINEAR] = frames.to_parent(into_base, velocity[:3])
-            values[_ANGULAR] = frames.to_parent(self._link_in_base, velocity[3:6])
+            into_base = scalars.axes(scalars.conjugate(base_turn))
+            values[_LINEAR] = scalars.to_parent(into_base, velocity[:3])
+            values[_ANGULAR] = scalars.to_parent(self._link_in_base, velocity[3:6])
         return self._odometry_encoder.encode(self._character.state.stamp_ns, values)
 
     def _publish_markers(self) -> None:

@@ -15,7 +15,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
-from msgs_config.geometry import fixed_order, frames, rotations
+from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
 from sim_node.physics.joint_constraints import couple_joints, set_friction
 from sim_node.physics.touches import TouchedLinks, net_wrenches
@@ -24,7 +24,7 @@ _QUATERNION = 4  # numbers; the engine has one for a ball joint
 _SEARCH_DISTANCE = 1e3  # m, beyond which the engine need not look for what is near
 
 
-BaseFrame: TypeAlias = tuple[frames.Triple, frames.Quaternion, frames.Axes]
+BaseFrame: TypeAlias = tuple[scalars.Vector, scalars.Quaternion, scalars.Axes]
 """Origin in m, orientation xyzw and axes of a base link in the world."""
 
 
@@ -59,7 +59,7 @@ class Body:
         self._base_is_inertial = poses[0] == Pose()
         self._base_turn_back: list[float] = self._turns_back[0].tolist()
         self._base_read: BaseFrame | None = None  # since the engine's last step
-        self._base_centre: frames.Triple | None = None  # as the engine has it, and as long as that
+        self._base_centre: scalars.Vector | None = None  # as the engine has it, and as long as that
         self._find_joints(character)
         set_link_dynamics(client, self._body, friction, speed_bound)
         pairs = zip(self._joints, self._axes, strict=True)
@@ -91,13 +91,13 @@ class Body:
         turns = {link.joint.name: link.inertial_pose.orientation_xyzw for link in character.links}
         # of each joint; the axes of a ball joint's inertial frame in its link's
         self._axes = [
-            frames.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
+            scalars.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
             for joint in joints
         ]
         pairs = zip(self._entries, self._axes, strict=True)
         self._balls = [(entries, axes) for entries, axes in pairs if axes is not None]
         # most inertial frames are not: then their axes alter nothing but the sign of zeros
-        self._turned = [ball for ball in self._balls if ball[1] != frames.NO_TURN]
+        self._turned = [ball for ball in self._balls if ball[1] != scalars.NO_TURN]
 
     def read(self) -> FloatArray:
         """Position and velocity, (2, n)."""
@@ -106,19 +106,19 @@ class Body:
         if self._floating:
             origin, motion, turn = self._read_base()
             position += origin
-            position += frames.rotation_vector(turn)
+            position += scalars.log(turn)
             velocity += motion
         if self._joints:
             states = pybullet.getJointStatesMultiDof(
                 self._body, self._joints, physicsClientId=self._client
             )
-            rotation_vector = frames.rotation_vector  # found once, not at each joint
+            rotation_vector = scalars.log  # found once, not at each joint
             for value, speed, _, _ in states:
                 position += rotation_vector(value) if len(value) == _QUATERNION else value
                 velocity += speed
         for entries, axes in self._turned if all(position) and all(velocity) else self._balls:
-            position[entries] = frames.to_parent(axes, position[entries])
-            velocity[entries] = frames.to_parent(axes, velocity[entries])
+            position[entries] = scalars.to_parent(axes, position[entries])
+            velocity[entries] = scalars.to_parent(axes, velocity[entries])
         both = position + velocity
         return np.fromiter(both, float, len(both)).reshape(2, -1)
 
@@ -144,8 +144,8 @@ class Body:
         for index, entries, axes in zip(self._joints, self._entries, self._axes, strict=True):
             value, speed = position[entries].tolist(), velocity[entries].tolist()
             if axes is not None:
-                value = rotations.exp(np.array(frames.to_child(axes, value))).tolist()
-                speed = frames.to_child(axes, speed)
+                value = rotations.exp(np.array(scalars.to_child(axes, value))).tolist()
+                speed = scalars.to_child(axes, speed)
             yield index, value, speed
 
     def set_motion(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -169,7 +169,7 @@ class Body:
         """Apply a generalised effort (n,) during the engine's next step, and only then."""
         values = effort.tolist()
         for entries, axes in self._turned:
-            values[entries] = frames.to_child(axes, values[entries])
+            values[entries] = scalars.to_child(axes, values[entries])
         forces = [values[entries] for entries in self._entries]
         pybullet.setJointMotorControlMultiDofArray(
             self._body,
@@ -197,7 +197,7 @@ class Body:
         pybullet.applyExternalForce(
             self._body, -1, force, origin, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
-        torque = frames.to_parent(axes, torque_in_base)
+        torque = scalars.to_parent(axes, torque_in_base)
         pybullet.applyExternalTorque(
             self._body, -1, torque, pybullet.WORLD_FRAME, physicsClientId=self._client
         )
@@ -298,28 +298,28 @@ class Body:
     def _base_frame(self) -> BaseFrame:
         com, inertial_turn = self._base_pose()
         if self._base_is_inertial and all(com) and all(inertial_turn):
-            return com, inertial_turn, frames.axes(inertial_turn)
-        turn = frames.product(inertial_turn, self._base_turn_back)
-        axes = frames.axes(turn)
-        x, y, z = frames.to_parent(axes, self._base_offset)
+            return com, inertial_turn, scalars.axes(inertial_turn)
+        turn = scalars.multiply(inertial_turn, self._base_turn_back)
+        axes = scalars.axes(turn)
+        x, y, z = scalars.to_parent(axes, self._base_offset)
         return (com[0] - x, com[1] - y, com[2] - z), turn, axes
 
-    def _base_pose(self) -> tuple[frames.Triple, frames.Quaternion]:
+    def _base_pose(self) -> tuple[scalars.Vector, scalars.Quaternion]:
         """Centre of mass in m and orientation xyzw of the base's inertial frame in the world."""
-        pose: tuple[frames.Triple, frames.Quaternion]
+        pose: tuple[scalars.Vector, scalars.Quaternion]
         pose = pybullet.getBasePositionAndOrientation(self._body, physicsClientId=self._client)
         self._base_centre = pose[0]
         return pose
 
-    def _read_base(self) -> tuple[frames.Triple, tuple[float, ...], frames.Quaternion]:
+    def _read_base(self) -> tuple[scalars.Vector, tuple[float, ...], scalars.Quaternion]:
         """Origin, velocity (6,) and orientation xyzw of the floating base, message form."""
         self._base_read = origin, turn, axes = self._base_frame()
         linear, angular = pybullet.getBaseVelocity(self._body, physicsClientId=self._client)
-        angular_in_base = frames.to_child(axes, angular)
+        angular_in_base = scalars.to_child(axes, angular)
         if self._base_is_inertial and all(linear):
             return origin, (*linear, *angular_in_base), turn
         vx, vy, vz = linear
-        x, y, z = frames.to_parent(axes, frames.cross(angular_in_base, self._base_offset))
+        x, y, z = scalars.to_parent(axes, scalars.cross(angular_in_base, self._base_offset))
         return origin, (vx - x, vy - y, vz - z, *angular_in_base), turn
 
     def _place_base(self, origin: FloatArray, turn_xyzw: FloatArray) -> None:
@@ -335,7 +335,7 @@ class Body:
         angular = angular_in_base.tolist()
         pybullet.resetBaseVelocity(
             self._body,
-            linear + frames.to_parent(axes, frames.cross(angular, self._base_offset)),
-            frames.to_parent(axes, angular),
+            linear + scalars.to_parent(axes, scalars.cross(angular, self._base_offset)),
+            scalars.to_parent(axes, angular),
             physicsClientId=self._client,
         )

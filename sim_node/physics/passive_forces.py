@@ -25,8 +25,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, SoftLimit
-from msgs_config.geometry import fixed_order, frames, rotations
-from msgs_config.geometry.frames import Triple
+from msgs_config.geometry import fixed_order, rotations, scalars
+from msgs_config.geometry.scalars import Vector
 from sim_node.physics.joint_resistance import JointResistance
 from sim_node.physics.wrenches import ExternalWrench
 
@@ -144,7 +144,7 @@ class PassiveForces:
 class PassedBound(NamedTuple):
     """A bound of a soft limit that a joint is beyond, or is about to pass."""
 
-    row: Triple  # of J, outwards: `de/dt = row . w` of the angular velocity w in the child frame
+    row: Vector  # of J, outwards: `de/dt = row . w` of the angular velocity w in the child frame
     explicit: float  # N m, the force if nothing yielded
     implicit: float  # N m s^2/rad, what each rad/s^2 of yielding takes away of it
 
@@ -157,8 +157,8 @@ def passed_bounds(
     Its rotation vector (3,) in rad, its angular velocity (3,) in the child frame in rad/s.
     """
     turn = closest_rotation_vector(turn, limit)
-    jacobian = frames.right_jacobian_inverse(turn)
-    rates = frames.to_parent(jacobian, spin)
+    jacobian = scalars.right_jacobian_inverse(turn)
+    rates = scalars.to_parent(jacobian, spin)
     for part, rate, row, lower, upper in zip(
         turn, rates, jacobian, limit.lower, limit.upper, strict=True
     ):

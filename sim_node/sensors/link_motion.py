@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Joint, Pose
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 
 _NO_VECTOR = (0.0, 0.0, 0.0)
 
@@ -17,23 +17,23 @@ _NO_VECTOR = (0.0, 0.0, 0.0)
 class Motion(NamedTuple):
     """A frame in the world, and its motion."""
 
-    origin: frames.Triple  # m
-    turn_xyzw: frames.Quaternion
-    velocity: frames.Triple  # of the origin, m/s, world axes
-    angular_velocity: frames.Triple  # rad/s, in the frame itself
+    origin: scalars.Vector  # m
+    turn_xyzw: scalars.Quaternion
+    velocity: scalars.Vector  # of the origin, m/s, world axes
+    angular_velocity: scalars.Vector  # rad/s, in the frame itself
 
     def at(self, position: Sequence[float], orientation_xyzw: Sequence[float]) -> "Motion":
         """The motion of a frame that is fixed to this one, in the pose given in it."""
-        axes = frames.axes(self.turn_xyzw)
-        x, y, z = frames.to_parent(axes, position)
-        vx, vy, vz = frames.to_parent(axes, frames.cross(self.angular_velocity, position))
+        axes = scalars.axes(self.turn_xyzw)
+        x, y, z = scalars.to_parent(axes, position)
+        vx, vy, vz = scalars.to_parent(axes, scalars.cross(self.angular_velocity, position))
         (ox, oy, oz), (wx, wy, wz) = self.origin, self.velocity
-        into_frame = frames.axes(frames.conjugate(orientation_xyzw))
+        into_frame = scalars.axes(scalars.conjugate(orientation_xyzw))
         return Motion(
             (ox + x, oy + y, oz + z),
-            frames.product(self.turn_xyzw, orientation_xyzw),
+            scalars.multiply(self.turn_xyzw, orientation_xyzw),
             (wx + vx, wy + vy, wz + vz),
-            frames.to_parent(into_frame, self.angular_velocity),
+            scalars.to_parent(into_frame, self.angular_velocity),
         )
 
 
@@ -62,7 +62,7 @@ class LinkKinematics:
         if self._floats:
             x, y, z, *turn = position[:6]
             vx, vy, vz, wx, wy, wz = velocity[:6]
-            moving = Motion((x, y, z), frames.quaternion(turn), (vx, vy, vz), (wx, wy, wz))
+            moving = Motion((x, y, z), scalars.exp(turn), (vx, vy, vz), (wx, wy, wz))
         for joint, entries in self._joints:
             pose = joint.pose_in_parent
             moving = moving.at(pose.position, pose.orientation_xyzw)
@@ -70,19 +70,19 @@ class LinkKinematics:
                 moving = _move(moving, joint, position[entries], velocity[entries])
         return moving
 
-    def orientation(self, position: Sequence[float]) -> frames.Quaternion:
+    def orientation(self, position: Sequence[float]) -> scalars.Quaternion:
         """The link's orientation xyzw in a position (n,), message form; the same as `motion`'s."""
         turn = self._base.orientation_xyzw
         if self._floats:
-            turn = frames.quaternion(position[3:6])
+            turn = scalars.exp(position[3:6])
         for joint, entries in self._joints:
-            turn = frames.product(turn, joint.pose_in_parent.orientation_xyzw)
+            turn = scalars.multiply(turn, joint.pose_in_parent.orientation_xyzw)
             if joint.type is JointType.SPHERICAL:
-                turn = frames.product(turn, frames.quaternion(position[entries]))
+                turn = scalars.multiply(turn, scalars.exp(position[entries]))
             elif joint.type is JointType.REVOLUTE:
                 (angle,), (x, y, z) = position[entries], joint.axis_in_child
-                turned = frames.quaternion((angle * x, angle * y, angle * z))
-                turn = frames.product(turn, turned)
+                turned = scalars.exp((angle * x, angle * y, angle * z))
+                turn = scalars.multiply(turn, turned)
         return turn
 
 
@@ -92,8 +92,8 @@ def _move(
     """The motion of a joint's child; `still` is that at position and velocity 0."""
     if joint.type is JointType.PRISMATIC:
         (shift,), (speed,), (x, y, z) = position, velocity, joint.axis_in_child
-        vx, vy, vz = frames.to_parent(
-            frames.axes(still.turn_xyzw), (speed * x, speed * y, speed * z)
+        vx, vy, vz = scalars.to_parent(
+            scalars.axes(still.turn_xyzw), (speed * x, speed * y, speed * z)
         )
         moved = still.at((shift * x, shift * y, shift * z), AT_REST.turn_xyzw)
         wx, wy, wz = moved.velocity
@@ -101,6 +101,6 @@ def _move(
     if joint.type is JointType.REVOLUTE:
         (angle,), (rate,), (x, y, z) = position, velocity, joint.axis_in_child
         position, velocity = (angle * x, angle * y, angle * z), (rate * x, rate * y, rate * z)
-    turned = still.at(_NO_VECTOR, frames.quaternion(position))
+    turned = still.at(_NO_VECTOR, scalars.exp(position))
     (vx, vy, vz), (wx, wy, wz) = velocity, turned.angular_velocity
     return turned._replace(angular_velocity=(wx + vx, wy + vy, wz + vz))

@@ -5,7 +5,7 @@ import math
 from functools import lru_cache, partial
 
 from msgs_config.character.sensors import Noise
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 from msgs_config.random_words import random_words
 
 _WORDS = 4  # for three normal numbers
@@ -28,7 +28,7 @@ class NoiseSource:
         # mostly the tick before had the same numbers
         self._walk_step = lru_cache(maxsize=_PATH)(partial(self._draw, _WALK))
 
-    def at(self, tick: int) -> frames.Triple:
+    def at(self, tick: int) -> scalars.Vector:
         """What is added to the vector at a tick."""
         value = self._bias
         if any(self._noise.stddev):
@@ -37,7 +37,7 @@ class NoiseSource:
             value = _add(value, _multiply(self._walk_per_tick, self._walk(tick)))
         return value
 
-    def _walk(self, tick: int) -> frames.Triple:
+    def _walk(self, tick: int) -> scalars.Vector:
         """A random walk of unit steps at a tick, found without those before.
 
         Between two known ticks a walk has normal distribution about their mean, with a quarter of
@@ -61,7 +61,7 @@ class NoiseSource:
                 low, at_low = middle, at_middle
         return at_high
 
-    def _draw(self, what: int, tick: int) -> frames.Triple:
+    def _draw(self, what: int, tick: int) -> scalars.Vector:
         """Three standard normal numbers.
 
         Source: Box and Muller 1958, "A Note on the Generation of Random Normal Deviates".
@@ -74,13 +74,13 @@ class NoiseSource:
         return (radius * math.cos(angle), radius * math.sin(angle), third)
 
 
-def _add(a: frames.Triple, b: frames.Triple) -> frames.Triple:
+def _add(a: scalars.Vector, b: scalars.Vector) -> scalars.Vector:
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-def _scale(factor: float, values: frames.Triple) -> frames.Triple:
+def _scale(factor: float, values: scalars.Vector) -> scalars.Vector:
     return (factor * values[0], factor * values[1], factor * values[2])
 
 
-def _multiply(a: frames.Triple, b: frames.Triple) -> frames.Triple:
+def _multiply(a: scalars.Vector, b: scalars.Vector) -> scalars.Vector:
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])

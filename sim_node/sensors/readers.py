@@ -12,7 +12,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.sensors import Noise, Sensor, SensorType
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 from msgs_config.messages.state import StampedState
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.sensors.link_motion import AT_REST, LinkKinematics, Motion
@@ -43,7 +43,7 @@ class SensorReader:
         """Find the sensor's link, and make the sources of its noise."""
         self._character, self._sensor, self._settings = character, sensor, settings
         self._kinematics = LinkKinematics(character.character, sensor.link)
-        self._axes = frames.axes(sensor.orientation_xyzw)  # of the sensor, in the link
+        self._axes = scalars.axes(sensor.orientation_xyzw)  # of the sensor, in the link
         name = f"{character.setup.prefix}{sensor.name}"
         self._noise = {
             quantity: NoiseSource(noise, settings.seed, f"{name}.{quantity}", settings.tick_s)
@@ -54,7 +54,7 @@ class SensorReader:
         """All doubles of the sensor's message at a tick; None if it has nothing to say."""
         raise NotImplementedError
 
-    def _with_noise(self, quantity: str, value: frames.Triple, tick: int) -> frames.Triple:
+    def _with_noise(self, quantity: str, value: scalars.Vector, tick: int) -> scalars.Vector:
         if quantity not in self._noise:
             return value
         (x, y, z), (dx, dy, dz) = value, self._noise[quantity].at(tick)
@@ -93,11 +93,11 @@ class ImuReader(SensorReader):
             (vx, vy, vz), (ux, uy, uz) = motion.velocity, self._motion(before).velocity
             h, gravity = self._settings.tick_s, self._settings.gravity
             in_world = ((vx - ux) / h, (vy - uy) / h, (vz - uz) / h + gravity)
-            force = frames.to_child(frames.axes(turn), in_world)
+            force = scalars.to_child(scalars.axes(turn), in_world)
             force = self._with_noise("linear_acceleration", force, tick)
             variance = self._first_variance
         if "orientation" in self._noise:
-            turn = frames.product(turn, frames.quaternion(self._noise["orientation"].at(tick)))
+            turn = scalars.multiply(turn, scalars.exp(self._noise["orientation"].at(tick)))
         self._last = (state, motion)
         doubles = self._doubles
         doubles[_ORIENTATION] = turn
@@ -142,12 +142,12 @@ class ForceReader(SensorReader):
         force = torque = (0.0, 0.0, 0.0)
         if contacts.touching[self._link]:
             fx, fy, fz, *moment = contacts.wrenches[self._link].tolist()
-            link = frames.axes(self._kinematics.orientation(state.position.tolist()))
-            force_in_link = frames.to_child(link, (fx, fy, fz))
-            x, y, z = frames.to_child(link, moment)
-            ax, ay, az = frames.cross(self._arm, force_in_link)
-            force = frames.to_child(self._axes, force_in_link)
-            torque = frames.to_child(self._axes, (x + ax, y + ay, z + az))
+            link = scalars.axes(self._kinematics.orientation(state.position.tolist()))
+            force_in_link = scalars.to_child(link, (fx, fy, fz))
+            x, y, z = scalars.to_child(link, moment)
+            ax, ay, az = scalars.cross(self._arm, force_in_link)
+            force = scalars.to_child(self._axes, force_in_link)
+            torque = scalars.to_child(self._axes, (x + ax, y + ay, z + az))
         force = self._with_noise("force", force, tick)
         return np.array((*force, *self._with_noise("torque", torque, tick)))
 

@@ -6,8 +6,8 @@ from controller_node.behaviours.state_machine.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
-from msgs_config.geometry.single_rotations import (
-    QuaternionXyzw,
+from msgs_config.geometry.scalars import (
+    Quaternion,
     Vector,
     about_z,
     add,
@@ -24,7 +24,7 @@ class Foot:
 
     sole: Vector  # m, the middle
     velocity: Vector  # m/s, of the foot's centre of mass
-    turn: QuaternionXyzw  # against how it stands, facing along x
+    turn: Quaternion  # against how it stands, facing along x
     load: float  # N, of what touches it, upwards
 
 
@@ -35,11 +35,11 @@ class Body:
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     root: Vector  # m
-    root_xyzw: QuaternionXyzw
-    tilt: QuaternionXyzw  # of the root against how it stands, facing along x
+    root_xyzw: Quaternion
+    tilt: Quaternion  # of the root against how it stands, facing along x
     centre: Vector  # m, of mass
     centre_velocity: Vector  # m/s
-    turns: list[QuaternionXyzw]  # orientation of each link
+    turns: list[Quaternion]  # orientation of each link
     spin: Vector  # rad/s, of the root
     feet: dict[str, Foot]  # by side
 
@@ -52,7 +52,7 @@ class Body:
 class BodyReader:
     """Makes a `Body` of each state."""
 
-    def __init__(self, model: DynamicsModel, legs: dict[str, Leg], upright: QuaternionXyzw) -> None:
+    def __init__(self, model: DynamicsModel, legs: dict[str, Leg], upright: Quaternion) -> None:
         """`upright` is the orientation of the root of a character that stands and faces along x."""
         self._model, self._legs = model, legs
         self._from_upright = conjugate(upright)
@@ -70,7 +70,7 @@ class BodyReader:
             )
             for side, leg in self._legs.items()
         }
-        quaternions: list[QuaternionXyzw] = [(x, y, z, w) for x, y, z, w in turns.tolist()]
+        quaternions: list[Quaternion] = [(x, y, z, w) for x, y, z, w in turns.tolist()]
         root_xyzw = quaternions[0]
         return Body(
             position=position,

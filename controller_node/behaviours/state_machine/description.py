@@ -5,7 +5,7 @@ from pathlib import Path
 
 from controller_node.behaviours.state_machine.support import Bounds
 from controller_node.references.steering.velocity import VelocityRegion
-from msgs_config.geometry.single_rotations import Vector
+from msgs_config.geometry.scalars import Vector
 
 STANCE, SWING = "stance", "swing"
 """The roles of the two sides; a state's end may swap them."""

@@ -22,7 +22,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
 from msgs_config.geometry import fixed_order
-from msgs_config.geometry.single_rotations import (
+from msgs_config.geometry.scalars import (
     Vector,
     about_x,
     about_y,

@@ -20,7 +20,7 @@ from controller_node.behaviours.state_machine.stepping import (
 )
 from controller_node.behaviours.state_machine.support import Contact
 from controller_node.references.steering.velocity import within
-from msgs_config.geometry.single_rotations import (
+from msgs_config.geometry.scalars import (
     Vector,
     about_z,
     add,

@@ -12,8 +12,8 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, ShapeType
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
-from msgs_config.geometry.single_rotations import (
-    QuaternionXyzw,
+from msgs_config.geometry.scalars import (
+    Quaternion,
     Vector,
     add,
     conjugate,
@@ -45,7 +45,7 @@ class FootPose(NamedTuple):
     """The middle of a sole in the world, m, and how the foot is turned against standing."""
 
     sole: Vector
-    turn: QuaternionXyzw
+    turn: Quaternion
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Leg:
     thigh_length: float  # m
     shin_length: float  # m
     knee_sign: float  # of the knee's angle where the shin goes backwards
-    upright: tuple[QuaternionXyzw, QuaternionXyzw, QuaternionXyzw]  # thigh, shin, foot, in world
-    fixed: tuple[QuaternionXyzw, QuaternionXyzw]  # of hip and ankle, child in parent, at angle 0
+    upright: tuple[Quaternion, Quaternion, Quaternion]  # thigh, shin, foot, in world
+    fixed: tuple[Quaternion, Quaternion]  # of hip and ankle, child in parent, at angle 0
     sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame
     half_length: float  # m, of the sole
     half_width: float  # m
@@ -78,12 +78,12 @@ class Leg:
             *range(ankle.start, ankle.stop),
         ]
 
-    def hip(self, root: Vector, root_xyzw: QuaternionXyzw) -> Vector:
+    def hip(self, root: Vector, root_xyzw: Quaternion) -> Vector:
         """Where the hip is, m, world."""
         return add(root, rotate(root_xyzw, self.hip_in_root))
 
     def angles(
-        self, root: Vector, root_xyzw: QuaternionXyzw, foot: FootPose, facing: Vector
+        self, root: Vector, root_xyzw: Quaternion, foot: FootPose, facing: Vector
     ) -> LegAngles:
         """The joint positions at which the foot has a pose; as near to it as the leg reaches.
 
@@ -114,7 +114,7 @@ class Leg:
         return math.sqrt(a * a + b * b + 2.0 * a * b * math.cos(flexion))
 
 
-def _hanging(along: Vector, left: Vector, angle: float) -> QuaternionXyzw:
+def _hanging(along: Vector, left: Vector, angle: float) -> Quaternion:
     """How a part of a leg that points `along`, then turned about left, is turned from standing."""
     ahead = cross(left, along)
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -190,7 +190,7 @@ def _hangs(places: list[Vector]) -> bool:
     return True
 
 
-def standing_frames(character: Character) -> tuple[list[Vector], list[QuaternionXyzw]]:
+def standing_frames(character: Character) -> tuple[list[Vector], list[Quaternion]]:
     """Origin, m, and orientation of each link at angles 0, upright, facing along x."""
     model, layout = DynamicsModel(character), character.layout
     standing = np.zeros(layout.size)
@@ -203,9 +203,7 @@ def standing_frames(character: Character) -> tuple[list[Vector], list[Quaternion
     return places, [(x, y, z, w) for x, y, z, w in turns.tolist()]
 
 
-def _sole(
-    character: Character, foot: int, upright_xyzw: QuaternionXyzw
-) -> tuple[Vector, float, float]:
+def _sole(character: Character, foot: int, upright_xyzw: Quaternion) -> tuple[Vector, float, float]:
     """Middle of the sole in the link frame, m, half its length ahead and half its width, m."""
     link = character.links[foot]
     boxes = [shape for shape in link.collision_shapes or link.shapes if shape.type is ShapeType.BOX]

@@ -35,7 +35,7 @@ from controller_node.references.steering.velocity import within
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
-from msgs_config.geometry.single_rotations import Vector
+from msgs_config.geometry.scalars import Vector
 
 _STANDING = Course()
 

@@ -13,8 +13,8 @@ from controller_node.behaviours.state_machine.situation import Situation
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.character.model import Character
-from msgs_config.geometry.single_rotations import (
-    QuaternionXyzw,
+from msgs_config.geometry.scalars import (
+    Quaternion,
     Vector,
     about_x,
     about_y,
@@ -40,8 +40,8 @@ class _Joint:
     entries: slice
     is_ball: bool
     parent: int
-    upright: QuaternionXyzw  # the child link's orientation where the character stands
-    fixed: QuaternionXyzw  # of the child in its parent at angle 0
+    upright: Quaternion  # the child link's orientation where the character stands
+    fixed: Quaternion  # of the child in its parent at angle 0
     mirror: float  # of a hinge's angle, on the other side
 
     def mirrored(self, value: Vector) -> Vector:
@@ -67,7 +67,7 @@ class PoseMaker:
         character: Character,
         machine: Machine,
         legs: Mapping[str, Leg],
-        upright: list[QuaternionXyzw],  # of each link of a standing character that faces along x
+        upright: list[Quaternion],  # of each link of a standing character that faces along x
         period: float,  # s
     ) -> None:
         self._layout: JointLayout = character.layout
@@ -170,7 +170,7 @@ def _facing(foot: FootPose) -> Vector:
     return rotate(about_z(yaw(foot.turn)), _LEFT)
 
 
-def _joints(character: Character, upright: list[QuaternionXyzw]) -> dict[str, _Joint]:
+def _joints(character: Character, upright: list[Quaternion]) -> dict[str, _Joint]:
     """The driven joints of a character by name."""
     joints = {}
     for row, link in enumerate(character.links):

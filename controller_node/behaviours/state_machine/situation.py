@@ -9,7 +9,7 @@ from controller_node.behaviours.state_machine.description import STEP, State
 from controller_node.behaviours.state_machine.leg import Leg
 from controller_node.behaviours.state_machine.stepping import sway_of_course
 from controller_node.references.steering.reference import Course
-from msgs_config.geometry.single_rotations import Vector, add, subtract
+from msgs_config.geometry.scalars import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
 _STEADY = 0.6  # of a sole, from its middle, that bears a body that stands

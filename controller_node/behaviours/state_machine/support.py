@@ -20,8 +20,8 @@ from controller_node.behaviours.state_machine.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
-from msgs_config.geometry.single_rotations import (
-    QuaternionXyzw,
+from msgs_config.geometry.scalars import (
+    Quaternion,
     Vector,
     add,
     cross,
@@ -109,7 +109,7 @@ def support_effort(
     acceleration: FloatArray,  # (n,) wanted; of the root none horizontally
     contacts: Sequence[Contact],  # whose shares are 1 together
     bounds: Bounds,
-    root: tuple[Vector, QuaternionXyzw],  # its place in m, and its orientation
+    root: tuple[Vector, Quaternion],  # its place in m, and its orientation
 ) -> FloatArray:
     """The effort (n,) of the joints; `model` has the present state. The root's is zero.
 
@@ -138,7 +138,7 @@ def _wrench_wanted(
     inertia: FloatArray,  # (6, 6): the root's wrench by its acceleration
     needed: FloatArray,  # (6,): its wrench where it does not accelerate horizontally
     contacts: Sequence[Contact],
-    root: tuple[Vector, QuaternionXyzw],
+    root: tuple[Vector, Quaternion],
 ) -> tuple[Vector, float]:
     """Force (N) at the centre of pressure, and moment about z there (N m).
 

@@ -11,7 +11,7 @@ os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")  # its elementary functio
 import numba
 
 from controller_node.references import offsets
-from msgs_config.geometry import frames
+from msgs_config.geometry import scalars
 
 _CONFIG: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -19,7 +19,7 @@ _HERE = Path(__file__).parent
 SOURCES = (
     *_HERE.glob("*.py"),
     Path(offsets.__file__),  # which functions come from: a test compares
-    Path(frames.__file__),
+    Path(scalars.__file__),
 )
 """All files with functions that are compiled here."""
 

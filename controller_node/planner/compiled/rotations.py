@@ -1,15 +1,15 @@
-"""Rotations in compiled code: those of `msgs_config.geometry.frames`, in the same doubles."""
+"""Rotations in compiled code: those of `msgs_config.geometry.scalars`, in the same doubles."""
 
 from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import FloatArray
-from msgs_config.geometry import frames
-from msgs_config.geometry.frames import Quaternion, Triple
+from msgs_config.geometry import scalars
+from msgs_config.geometry.scalars import Quaternion, Vector
 
-axes = compiled(frames.axes)
-product = compiled(frames.product)
-right_jacobian_inverse = compiled(frames.right_jacobian_inverse)
-rotation_vector = compiled(frames.rotation_vector)
-to_parent = compiled(frames.to_parent)
+axes = compiled(scalars.axes)
+product = compiled(scalars.multiply)
+right_jacobian_inverse = compiled(scalars.right_jacobian_inverse)
+rotation_vector = compiled(scalars.log)
+to_parent = compiled(scalars.to_parent)
 
 
 @compiled
@@ -19,7 +19,7 @@ def quaternion(position: FloatArray, start: int) -> Quaternion:
 
 
 @compiled
-def turn_between(start_xyzw: Quaternion, end_xyzw: Quaternion) -> Triple:
+def turn_between(start_xyzw: Quaternion, end_xyzw: Quaternion) -> Vector:
     """The rotation vector in rad of `start^-1 end`, in the frame of `start`."""
     x, y, z, w = start_xyzw
     return rotation_vector(product((-x, -y, -z, w), end_xyzw))

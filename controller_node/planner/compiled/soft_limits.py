@@ -17,7 +17,7 @@ from controller_node.planner.compiled.rotations import (
     to_parent,
 )
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.geometry.frames import Quaternion, Triple
+from msgs_config.geometry.scalars import Quaternion, Vector
 
 MOST_BOUNDS = 32
 """More that are passed at once are left out."""
@@ -131,7 +131,7 @@ def is_less(turn_xyzw: Quaternion, angle: float) -> bool:
 
 
 @compiled
-def _is_near(turn: Triple, lower: FloatArray, upper: FloatArray, reach: float) -> bool:
+def _is_near(turn: Vector, lower: FloatArray, upper: FloatArray, reach: float) -> bool:
     near = False
     for i in range(3):
         near |= turn[i] < lower[i] + reach or turn[i] > upper[i] - reach
@@ -139,7 +139,7 @@ def _is_near(turn: Triple, lower: FloatArray, upper: FloatArray, reach: float) -
 
 
 @compiled
-def _nearer_to(turn: Triple, lower: FloatArray, upper: FloatArray) -> Triple:
+def _nearer_to(turn: Vector, lower: FloatArray, upper: FloatArray) -> Vector:
     """Of a rotation vector and the longer way round the one nearer to the bounds."""
     x, y, z = turn
     angle = math.sqrt(x * x + y * y + z * z)
@@ -152,7 +152,7 @@ def _nearer_to(turn: Triple, lower: FloatArray, upper: FloatArray) -> Triple:
 
 
 @compiled
-def _squared_excess(turn: Triple, lower: FloatArray, upper: FloatArray) -> float:
+def _squared_excess(turn: Vector, lower: FloatArray, upper: FloatArray) -> float:
     square = 0.0
     for i in range(3):
         beyond = max(turn[i] - upper[i], lower[i] - turn[i], 0.0)

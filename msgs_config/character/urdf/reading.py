@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from msgs_config import files
 from msgs_config.character.urdf.vocabulary import LeftOut, leave_out_unknown, listed
 from msgs_config.errors import CharacterError
-from msgs_config.geometry.single_rotations import norm
+from msgs_config.geometry.scalars import norm
 
 WITH_AXIS = ("revolute", "continuous", "prismatic")
 """The types of joints that move along or about an axis."""

@@ -11,7 +11,7 @@ from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.character.urdf.described_joints import DescribedJoints
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.errors import ConfigurationError
-from msgs_config.geometry import frames, rotations
+from msgs_config.geometry import rotations, scalars
 from sim_node import parameters as for_simulator
 from tests.support.description import link_frames, parse
 from tests.support.urdf import inertial, joint, link, refusal, robot, write_character
@@ -168,6 +168,6 @@ def test_a_sensor_cannot_be_the_frame_of_the_base_or_of_odom(parameter: str) -> 
 
 def test_urdfs_angles_are_those_of_the_description() -> None:
     for roll, pitch, yaw in np.random.default_rng(1).uniform(-1.5, 1.5, (20, 3)):
-        turn = np.array(frames.of_roll_pitch_yaw((roll, pitch, yaw)))
+        turn = np.array(scalars.of_roll_pitch_yaw((roll, pitch, yaw)))
         assert rotations.yaw_pitch_roll(rotations.matrix(turn)) == pytest.approx((yaw, pitch, roll))
         assert math.isclose(float(turn @ turn), 1.0)

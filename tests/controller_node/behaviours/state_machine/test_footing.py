@@ -14,7 +14,7 @@ from controller_node.behaviours.state_machine.leg import FootPose
 from controller_node.behaviours.state_machine.machine import MachineKit
 from controller_node.behaviours.state_machine.situation import Situation, situation_of
 from controller_node.references.steering.reference import Course
-from msgs_config.geometry.single_rotations import Vector, subtract
+from msgs_config.geometry.scalars import Vector, subtract
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from controller_node.behaviours.state_machine.leg import FootPose, make_leg
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError
-from msgs_config.geometry.single_rotations import (
+from msgs_config.geometry.scalars import (
     Vector,
     about_z,
     add,

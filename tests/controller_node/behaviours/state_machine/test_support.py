@@ -12,7 +12,7 @@ from controller_node.behaviours.state_machine.support import (
 )
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import rotations
-from msgs_config.geometry.single_rotations import Vector
+from msgs_config.geometry.scalars import Vector
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")

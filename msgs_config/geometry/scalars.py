@@ -1,8 +1,8 @@
-"""One frame's rotation in plain numbers: on so few of them a fraction of the time of arrays.
+"""One vector or rotation at a time, in plain numbers: a fraction of the time of arrays.
 
-Quaternions are xyzw; axes are rows of a rotation matrix, which turn coordinates of the child frame
-into the parent frame. Sums have the order of `msgs_config.geometry.fixed_order`, so that a rotation
-of `msgs_config.geometry.rotations` gives the same doubles.
+Quaternions are xyzw, and turn coordinates of the child frame into the parent frame; so do axes,
+which are the rows of a rotation matrix. Sums have the order of `msgs_config.geometry.fixed_order`,
+so that functions of `msgs_config.geometry.rotations` with the same names give the same doubles.
 """
 
 import math
@@ -12,15 +12,42 @@ from typing import TypeAlias
 _TINY_DIVISOR = 1e-150  # keeps 0 / 0 away
 _SMALL_HALF = 5e-3  # rad
 
-Triple: TypeAlias = tuple[float, float, float]
-Axes: TypeAlias = tuple[Triple, Triple, Triple]
+Vector: TypeAlias = tuple[float, float, float]
+Axes: TypeAlias = tuple[Vector, Vector, Vector]
 Quaternion: TypeAlias = tuple[float, float, float, float]
 
+IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
+"""The quaternion of no turn."""
 NO_TURN: Axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 """Axes that are the parent's: to turn by them alters nothing but the sign of zeros."""
 
 
-def product(a_xyzw: Sequence[float], b_xyzw: Sequence[float]) -> Quaternion:
+def add(a: Vector, b: Vector) -> Vector:
+    """The sum of two vectors."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """The difference `a - b`."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(factor: float, a: Vector) -> Vector:
+    """A vector times a factor."""
+    return (factor * a[0], factor * a[1], factor * a[2])
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def norm(a: Vector) -> float:
+    """Euclidean length."""
+    return math.sqrt(dot(a, a))
+
+
+def multiply(a_xyzw: Sequence[float], b_xyzw: Sequence[float]) -> Quaternion:
     """Hamilton product `a b`: turn by b first, then by a."""
     ax, ay, az, aw = a_xyzw
     bx, by, bz, bw = b_xyzw
@@ -32,7 +59,7 @@ def product(a_xyzw: Sequence[float], b_xyzw: Sequence[float]) -> Quaternion:
     )
 
 
-def quaternion(rotation_vector: Sequence[float]) -> Quaternion:
+def exp(rotation_vector: Sequence[float]) -> Quaternion:
     """The unit quaternion of a rotation vector in rad."""
     x, y, z = rotation_vector
     half = 0.5 * math.sqrt(x * x + y * y + z * z)
@@ -43,8 +70,8 @@ def quaternion(rotation_vector: Sequence[float]) -> Quaternion:
 def of_roll_pitch_yaw(angles: Sequence[float]) -> Quaternion:
     """The unit quaternion of URDF's angles in rad: turn about x, then fixed y, then fixed z."""
     roll, pitch, yaw = angles
-    about_y_and_z = product(quaternion((0.0, 0.0, yaw)), quaternion((0.0, pitch, 0.0)))
-    return product(about_y_and_z, quaternion((roll, 0.0, 0.0)))
+    about_y_and_z = multiply(exp((0.0, 0.0, yaw)), exp((0.0, pitch, 0.0)))
+    return multiply(about_y_and_z, exp((roll, 0.0, 0.0)))
 
 
 def conjugate(q_xyzw: Sequence[float]) -> Quaternion:
@@ -65,28 +92,28 @@ def axes(q_xyzw: Quaternion) -> Axes:
     )
 
 
-def to_parent(turn: Axes, vector: Sequence[float]) -> Triple:
+def to_parent(turn: Axes, vector: Sequence[float]) -> Vector:
     """A vector of the child frame, in the parent frame."""
     x, y, z = vector
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = turn
     return (ax * x + ay * y + az * z, bx * x + by * y + bz * z, cx * x + cy * y + cz * z)
 
 
-def to_child(turn: Axes, vector: Sequence[float]) -> Triple:
+def to_child(turn: Axes, vector: Sequence[float]) -> Vector:
     """A vector of the parent frame, in the child frame."""
     x, y, z = vector
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = turn
     return (ax * x + bx * y + cx * z, ay * x + by * y + cy * z, az * x + bz * y + cz * z)
 
 
-def cross(a: Sequence[float], b: Sequence[float]) -> Triple:
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
     """The vector product `a x b`."""
     ax, ay, az = a
     bx, by, bz = b
     return (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
-def rotation_vector(q_xyzw: Sequence[float]) -> Triple:
+def log(q_xyzw: Sequence[float]) -> Vector:
     """The rotation vector in rad, of norm at most pi, of a unit quaternion."""
     x, y, z, w = q_xyzw
     sine = math.sqrt(x * x + y * y + z * z)
@@ -117,3 +144,56 @@ def right_jacobian_inverse(rotation_vector: Sequence[float]) -> Axes:
         (xy + hz, 1.0 - c * (xx + zz), yz - hx),
         (xz - hy, yz + hx, 1.0 - c * (xx + yy)),
     )
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """A vector given in the child frame, in the parent frame: `v + 2 w (u x v) + 2 u x (u x v)`."""
+    u = (q[0], q[1], q[2])
+    once = cross(u, v)
+    twice = cross(u, once)
+    w = q[3]
+    return (
+        v[0] + 2.0 * (w * once[0] + twice[0]),
+        v[1] + 2.0 * (w * once[1] + twice[1]),
+        v[2] + 2.0 * (w * once[2] + twice[2]),
+    )
+
+
+def about_x(angle: float) -> Quaternion:
+    """A turn about x by an angle in rad."""
+    return (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle))
+
+
+def about_y(angle: float) -> Quaternion:
+    """A turn about y by an angle in rad."""
+    return (0.0, math.sin(0.5 * angle), 0.0, math.cos(0.5 * angle))
+
+
+def about_z(angle: float) -> Quaternion:
+    """A turn about z by an angle in rad."""
+    return (0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle))
+
+
+def yaw(q: Quaternion) -> float:
+    """Angle in rad, -pi to pi, about the parent's z: the twist of swing and twist."""
+    return 2.0 * math.atan2(q[2] * math.copysign(1.0, q[3]), abs(q[3]))
+
+
+def of_axes(x: Vector, y: Vector, z: Vector) -> Quaternion:
+    """The quaternion of a frame whose axes, orthonormal, are given in the parent frame.
+
+    Source: Shepperd 1978: the largest of the four components is found first.
+    """
+    trace = x[0] + y[1] + z[2]
+    squares = (x[0], y[1], z[2], trace)
+    largest = squares.index(max(squares))
+    if largest == 3:
+        q = (y[2] - z[1], z[0] - x[2], x[1] - y[0], 1.0 + trace)
+    elif largest == 0:
+        q = (1.0 + 2.0 * x[0] - trace, x[1] + y[0], z[0] + x[2], y[2] - z[1])
+    elif largest == 1:
+        q = (x[1] + y[0], 1.0 + 2.0 * y[1] - trace, y[2] + z[1], z[0] - x[2])
+    else:
+        q = (z[0] + x[2], y[2] + z[1], 1.0 + 2.0 * z[2] - trace, x[1] - y[0])
+    length = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)
