@@ -5,7 +5,6 @@ them. Up to the fork it compares each state with the recorded one.
 """
 
 import json
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -24,14 +23,14 @@ from actuated_characters.replay.comparison import (
     first_difference,
 )
 from actuated_characters.replay.players.controller_parameters import late_topics
-from actuated_characters.replay.players.processes import ANSWER_TIMEOUT
+from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.wrenches import read_pushes
-from msgs_config.bus.composition import ComposableNode, Turns, ros_node
-from msgs_config.bus.node import BusNode, Executor, Publisher, StopFlag, Subscription
-from msgs_config.errors import ReplayError, RunError
+from msgs_config.bus.composition import Turns, ros_node
+from msgs_config.bus.node import BusNode, Publisher, Subscription
+from msgs_config.errors import ReplayError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
@@ -55,14 +54,13 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGE_TIMEOUT = 10.0  # s until a node has what it was sent
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
 _SERVICES = {"pause": True, "step": False, "reset": False}  # whether each takes a flag
 _HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
 
 
-class ForkNode(ComposableNode):
+class ForkNode(Player):
     """Steps the simulator from input to input, and lets it run after the last one."""
 
     def __init__(self, node: BusNode | None = None) -> None:
@@ -73,7 +71,7 @@ class ForkNode(ComposableNode):
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be repeated.
         """
-        super().__init__(node or ros_node("fork"))
+        super().__init__(node or ros_node("fork"), silent=True)
         values = resolve(PARAMETERS, self.node.given_parameters())
         self.node.declare(PARAMETERS, values)
         path, self._row = Path(values.text("recording")), values.integer("row")
@@ -108,19 +106,13 @@ class ForkNode(ComposableNode):
         self._torques: Subscription | None = None
         self._states: Subscription | None = None
 
-    def turns(self, stop: StopFlag, executor: Executor) -> Turns:
+    def play(self) -> Turns:
         """Repeat the run and send what is new, then stay until `stop`.
 
         Raises:
             ReplayError: a state before the fork, or its own, is not the recorded one.
             RunError: a node does not answer, or does not accept what it is sent.
         """
-        self._stop = stop
-        yield from self._play()
-        while not stop:
-            yield _REST
-
-    def _play(self) -> Turns:
         # no limit for the start: the command that has started all knows one
         yield from self._wait(self._is_connected, "simulator and controller", np.inf)
         # the first tick is held by its time: a paused simulator would not repeat the first state
@@ -133,7 +125,7 @@ class ForkNode(ComposableNode):
         yield from self._set(topics.SIM_NODE, {_PACE: 0.0})
         present = 0
         for row in sorted({*self._stops, *self._requests, self._row + 1} - {0}):
-            if self._stop:
+            if self.stop:
                 return
             yield from self._step(present, row - 1)
             present = row - 1
@@ -144,6 +136,8 @@ class ForkNode(ComposableNode):
         self._torques.close()
         self._torques = None
         yield from self._call("pause", flag=False)
+        while not self.stop:
+            yield _REST
 
     def _is_connected(self) -> bool:
         """Whether all are there that will be called or sent something."""
@@ -187,8 +181,7 @@ class ForkNode(ComposableNode):
             yield from self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
-            if not self._outgoing[name][0].is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
-                raise RunError(f"what was sent on '{name}' was not acknowledged")
+            self.acknowledge(self._outgoing[name][0], f"what was sent on '{name}'")
         if stop.resets:
             yield from self._call("reset")
 
@@ -198,36 +191,22 @@ class ForkNode(ComposableNode):
         yield from self._wait(lambda: self._answered_ns >= stamp_ns, what, timeout)
 
     def _set(self, node: str, settings: dict[str, Any]) -> Turns:
-        """Set parameters of a node. Raises RunError if it rejects one."""
-        answer = self._clients[node].set_parameters(settings)
-        yield from self._wait(lambda: answer.is_given, f"{node} to take {', '.join(settings)}")
-        if answer.is_given and not answer.success:
-            raise RunError(f"{node} rejected {', '.join(settings)}: {answer.message}")
+        yield from self.set_parameters(self._clients[node], node, settings)
 
     def _call(self, name: str, *, flag: bool = True, timeout: float = ANSWER_TIMEOUT) -> Turns:
-        """Call a service of the simulator. Raises RunError if it does not do it."""
-        answer = self._clients[topics.SIM_NODE].call(name, flag)
-        yield from self._wait(lambda: answer.is_given, f"{topics.SIM_NODE} to {name}", timeout)
-        if answer.is_given and not answer.success:
-            raise RunError(f"sim_node did not {name}: {answer.message}")
+        simulator = self._clients[topics.SIM_NODE]
+        yield from self.call(simulator, topics.SIM_NODE, name, flag=flag, timeout=timeout)
 
     def _wait(
         self, condition: Callable[[], bool], what: str, timeout: float = ANSWER_TIMEOUT
     ) -> Turns:
-        """Compare states until a condition holds, or until this node is to stop.
+        """Wait for a condition, after having compared the states that have come."""
 
-        Raises:
-            ReplayError: see `turns`.
-            RunError: it took longer than the timeout in s.
-        """
-        deadline = time.monotonic() + timeout
-        while not self._stop:
+        def holds() -> bool:
             self._take_messages()
-            if condition():
-                return
-            if time.monotonic() > deadline:
-                raise RunError(f"waited {timeout:g} s for {what}")
-            yield _REST
+            return condition()
+
+        yield from self.wait(holds, lambda: what, timeout)
 
     def _take_messages(self) -> None:
         """Take the states and torques that have come, of the session of this run."""

@@ -12,8 +12,8 @@ from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, Stat
 from actuated_characters.replay.players.character_files import write_character, write_urdf
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
+from actuated_characters.replay.players.player import ANSWER_TIMEOUT
 from actuated_characters.replay.players.processes import (
-    ANSWER_TIMEOUT,
     Progress,
     Tell,
     child_processes,

@@ -7,12 +7,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from actuated_characters.replay.players.player import STATE, WAITING
 from actuated_characters.runs.processes import Child, Children
 from actuated_characters.runs.ros_domain import own_domain
 from msgs_config.errors import RunError
-
-ANSWER_TIMEOUT = 60.0
-"""s that an answer may take, on a machine that may be busy with other things."""
 
 Progress = Callable[[int], None]
 """Is called with the number of states so far."""
@@ -20,43 +18,7 @@ Progress = Callable[[int], None]
 Tell = Callable[[str], None]
 """Is called with a line for the user, such as what is waited for."""
 
-_WAITING, _STATE = "waiting for ", "state "  # begin the lines of a player's reports
 _POLL_PERIOD = 0.05  # s
-_WAITING_PERIOD = 2.0  # s between reports
-_STATE_PERIOD = 0.1  # s between reports
-
-
-class PlayerReport:
-    """Prints how far a player is and what it waits for, and gives up when that takes too long."""
-
-    def __init__(self) -> None:
-        self._next_state = 0.0  # s, by the monotonic clock
-        self.begin_wait()
-
-    def begin_wait(self) -> None:
-        """Begin to wait for something."""
-        self._since = time.monotonic()
-        self._next_line = self._since + _WAITING_PERIOD
-
-    def tell_wait(self, what: Callable[[], str], timeout: float = ANSWER_TIMEOUT) -> None:
-        """Print what is waited for, each 2 s; `timeout` in s, which may be infinite.
-
-        Raises:
-            RunError: it has taken longer.
-        """
-        now = time.monotonic()
-        if now > self._since + timeout:
-            raise RunError(f"waited {timeout:g} s for {what()}")
-        if now > self._next_line:
-            self._next_line = now + _WAITING_PERIOD
-            print(f"{_WAITING}{what()}", flush=True)
-
-    def tell_state(self, count: int) -> None:
-        """Print the number of states so far, ten times a second at the most."""
-        now = time.monotonic()
-        if now > self._next_state:
-            self._next_state = now + _STATE_PERIOD
-            print(f"{_STATE}{count}", flush=True)
 
 
 @contextmanager
@@ -93,10 +55,10 @@ def wait_for_player(player: Child, others: Sequence[Child], progress: Progress, 
     while True:
         has_ended = player.exit_code is not None  # before its last lines are read
         for line in player.read_lines():
-            if line.startswith(_WAITING):
+            if line.startswith(WAITING):
                 tell(line)
-            elif line.startswith(_STATE):
-                progress(int(line.removeprefix(_STATE)))
+            elif line.startswith(STATE):
+                progress(int(line.removeprefix(STATE)))
         if has_ended:
             break
         for other in others:

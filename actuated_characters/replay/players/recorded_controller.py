@@ -3,23 +3,18 @@
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.node import Node
-from std_srvs.srv import Trigger
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.replay.comparison import EFFORT, POSITION, VELOCITY, clock_of
 from actuated_characters.replay.players.controller_parameters import reset_changes
-from actuated_characters.replay.players.processes import PlayerReport
+from actuated_characters.replay.players.player import Player
 from actuated_characters.replay.players.simulator_inputs import SimulatorInputs, make_inputs
 from actuated_characters.replay.world import read_world
 from msgs_config.arrays import FloatArray
-from msgs_config.bus.dds import create_publisher
-from msgs_config.bus.polling import DirectSubscription, PollingExecutor
-from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
+from msgs_config.bus.composition import Turns, ros_node
+from msgs_config.bus.node import BusNode
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
@@ -29,7 +24,6 @@ from msgs_config.messages.session import SESSION, given_session, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.process import StopSignal
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -38,88 +32,76 @@ PARAMETERS = [
     SESSION,
 ]
 
-_ACKNOWLEDGE_TIMEOUT = 10.0  # s until the simulator has a push or throw
 
-
-class RecordedController(Node):
+class RecordedController(Player):
     """Answers each state as it was answered then: torques, what came before them, or a reset."""
 
-    def __init__(self) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the recording, and offer the topics of each of its characters.
+
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be played.
         """
-        super().__init__("player")
-        values = resolve(PARAMETERS, given_parameters(self))
-        declare(self, PARAMETERS, values)
+        super().__init__(node or ros_node("player"))
+        values = resolve(PARAMETERS, self.node.given_parameters())
+        self.node.declare(PARAMETERS, values)
         self._file = Path(values.text("states"))
         world, _ = read_world(Path(values.text("recording")), values.integer("world"))
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
-        self._reset_client = self.create_client(Trigger, f"{topics.SIM_NODE}/reset")
+        self._simulator = self.node.client(topics.SIM_NODE, {"reset": False})
         self._changes = reset_changes(world)
-        self._setter = self.create_client(
-            SetParametersAtomically, f"{topics.SIM_NODE}/set_parameters_atomically"
-        )
         session = given_session(values)
         self._throw_codec = ThrowCodec(session)
-        self._throw_topic = create_publisher(self, topics.THROW)
+        self._throw_topic = self.node.publisher(topics.THROW)
         inputs = make_inputs(world)
         self._characters = [
-            _CharacterTopics(self, *each, session) for each in zip(world, inputs, strict=True)
+            _CharacterTopics(self.node, *each, session) for each in zip(world, inputs, strict=True)
         ]
         self._ticks, self._resets = len(inputs[0].commands), inputs[0].resets
-        self._report = PlayerReport()
 
-    def run(self, stop: StopSignal) -> None:
+    def play(self) -> Turns:
         """Play until the last state has come back, or until `stop`; then write the states.
 
         Raises:
             RunError: the simulator does not answer, or it leaves out a state.
         """
-        executor = PollingExecutor(self)
+        self._played = 0  # states that all characters have
         try:
-            while not stop and not self._is_subscribed():
-                executor.rest()
-                self._report.tell_wait(
-                    lambda: "sim_node to listen to torques, pushes, throws and resets"
+            yield from self.wait(
+                self._is_subscribed,
+                lambda: "sim_node to listen to torques, pushes, throws and resets",
+            )
+            while not self.stop and self._played <= self._ticks:
+                yield from self.wait(
+                    self._has_states, lambda: f"the state of tick {FIRST_TICK + self._played}"
                 )
-            self._play(stop, executor)
+                if self._played < self._ticks and not self.stop:
+                    yield from self._replay_tick(self._played)
+                self._played += 1
+                self.tell_state(self._played)
         finally:
-            executor.close()
             np.savez(self._file, **self._arrays())  # type: ignore[arg-type]  # no flag is among them
 
     def _is_subscribed(self) -> bool:
         """Whether the simulator receives all that it will be sent."""
         publishers = [self._throw_topic, *(p for each in self._characters for p in each.publishers)]
-        is_ready = self._reset_client.service_is_ready() and self._setter.service_is_ready()
-        return is_ready and all(each.get_subscription_count() for each in publishers)
+        return self._simulator.is_ready and all(p.get_subscription_count() for p in publishers)
 
-    def _play(self, stop: StopSignal, executor: PollingExecutor) -> None:
-        """Answer state after state, each when all characters have it."""
-        self._played = 0  # states that all characters have
-        self._report.begin_wait()
-        while not stop and self._played <= self._ticks:
-            received = [each.receive() for each in self._characters]  # of all, not until one
-            if any(received):
-                executor.received()
-                executor.serve()
-            else:
-                executor.rest()
-                self._report.tell_wait(lambda: f"the state of tick {FIRST_TICK + self._played}")
-            if min(len(each.states) for each in self._characters) > self._played:
-                if self._played < self._ticks:
-                    self._replay_tick(self._played, stop, executor)
-                self._played += 1
-                self._report.tell_state(self._played)
-                self._report.begin_wait()
+    def _has_states(self) -> bool:
+        """Take what has come; whether every character has one more state."""
+        for each in self._characters:
+            while each.receive():
+                self.executor.received()
+        return min(len(each.states) for each in self._characters) > self._played
 
-    def _replay_tick(self, tick: int, stop: StopSignal, executor: PollingExecutor) -> None:
+    def _replay_tick(self, tick: int) -> Turns:
         """Let the simulator do what it did in a tick, counted from 0."""
         if tick in self._resets:
             if change := self._changes.get(tick + 1):
-                self._set(change, stop, executor)
-            self._reset_client.call_async(Trigger.Request())  # the next state is its answer
+                yield from self.set_parameters(self._simulator, topics.SIM_NODE, change)
+            self._simulator.call("reset")  # the next state is its answer
             for each in self._characters:
                 each.last_sent = []  # that answers a state before the reset
             return
@@ -130,25 +112,14 @@ class RecordedController(Node):
         for each in self._characters:
             each.command(tick)
 
-    def _set(self, change: dict[str, Any], stop: StopSignal, executor: PollingExecutor) -> None:
-        """Change parameters of the simulator, which count from the reset that follows."""
-        future = self._setter.call_async(set_request(change))
-        self._report.begin_wait()
-        while not stop and not future.done():
-            executor.rest()
-            self._report.tell_wait(lambda: f"sim_node to accept {', '.join(change)}")
-        response = future.result() if future.done() else None
-        if response is not None and not response.result.successful:
-            raise RunError(f"sim_node rejected {', '.join(change)}: {response.result.reason}")
-
     def _throw(self, tick: int) -> None:
         """Send what was thrown as a tick began; returns when the simulator has it."""
         throws = self._throws[tick] if self._throws else ()
         for throw in throws:
             stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + tick)
             self._throw_topic.publish(self._throw_codec.encode(stamp_ns, throw))
-        if throws and not self._throw_topic.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
-            raise RunError(f"the throws of tick {FIRST_TICK + tick} were not acknowledged")
+        if throws:
+            self.acknowledge(self._throw_topic, f"what was thrown at tick {FIRST_TICK + tick}")
 
     def _arrays(self) -> dict[str, FloatArray]:
         """What has come back: `position_0` (m, n) and so on, of each character."""
@@ -169,7 +140,7 @@ class _CharacterTopics:
     """The topics of a character: what is sent to it, and the states that come back."""
 
     def __init__(
-        self, node: Node, recording: Recording, inputs: SimulatorInputs, session: str
+        self, node: BusNode, recording: Recording, inputs: SimulatorInputs, session: str
     ) -> None:
         """Offer the topics, below the character's name where there are several."""
         name = recording.world.name
@@ -180,10 +151,10 @@ class _CharacterTopics:
         self._layout, self._clock = recording.layout, clock_of(recording)
         self._decoder = JointStateDecoder()
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
-        self._torques = create_publisher(node, topics.JOINT_TORQUES.under(name))
-        self._wrenches = create_publisher(node, topics.EXTERNAL_WRENCH.under(name))
+        self._torques = node.publisher(topics.JOINT_TORQUES.under(name))
+        self._wrenches = node.publisher(topics.EXTERNAL_WRENCH.under(name))
         self.publishers = self._torques, self._wrenches
-        self._subscription = DirectSubscription(node, topics.JOINT_STATES.under(name))
+        self._subscription = node.subscription(topics.JOINT_STATES.under(name))
 
     def receive(self) -> bool:
         """Take a state if one is there; returns whether there was one.
@@ -223,8 +194,7 @@ class _CharacterTopics:
             stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
             own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
-            if not self._wrenches.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
-                raise RunError(f"the push of tick {FIRST_TICK + tick} was not acknowledged")
+            Player.acknowledge(self._wrenches, f"the push of tick {FIRST_TICK + tick}")
 
     def command(self, tick: int) -> None:
         """Send what was commanded in a tick."""

@@ -2,18 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.node import Node
 
 from actuated_characters.bags.recording import CommandArrays, Recording, read_recording
 from actuated_characters.replay.command_comparison import merge_commands, recorded_commands
 from actuated_characters.replay.players.controller_parameters import late_topics, parameter_changes
-from actuated_characters.replay.players.processes import ANSWER_TIMEOUT, PlayerReport
+from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player, some_of
 from actuated_characters.replay.players.simulator_outputs import (
     REQUESTS,
     SessionRewriter,
@@ -24,11 +20,10 @@ from actuated_characters.replay.players.simulator_outputs import (
     tick_topics,
 )
 from msgs_config.arrays import BoolArray
-from msgs_config.bus.dds import create_publisher
+from msgs_config.bus.composition import Turns, ros_node
+from msgs_config.bus.node import BusNode
 from msgs_config.bus.once_logger import OnceLogger
-from msgs_config.bus.polling import DirectSubscription, PollingExecutor
-from msgs_config.bus.ros_parameters import declare, given_parameters, set_request
-from msgs_config.errors import MessageError, RecordingError, RunError
+from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.joint_state import JointStateDecoder
@@ -41,7 +36,6 @@ from msgs_config.messages.session import (
 )
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, resolve
-from msgs_config.runtime.process import StopSignal
 
 PARAMETERS = [
     Parameter("recording", "", "the bag, or the directory of its run"),
@@ -60,23 +54,24 @@ PARAMETERS = [
 ]
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
-_ACKNOWLEDGE_TIMEOUT = 10.0  # s until the controller has a trajectory or strengths
 
 
-class RecordedSimulator(Node):
+class RecordedSimulator(Player):
     """Publishes recorded states, in lockstep with the controller that answers them."""
 
-    def __init__(self) -> None:
+    def __init__(self, node: BusNode | None = None) -> None:
         """Read the recording, and offer the simulator's topics.
+
+        Without a place on a bus it is a node of ROS.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be played.
         """
-        super().__init__(topics.SIM_NODE)
-        values = resolve(PARAMETERS, given_parameters(self))
-        declare(self, PARAMETERS, values)
+        super().__init__(node or ros_node(topics.SIM_NODE))
+        values = resolve(PARAMETERS, self.node.given_parameters())
+        self.node.declare(PARAMETERS, values)
         self._file = Path(values.text("commands"))
-        self._session = given_session(values) or make_session(self.get_fully_qualified_name())
+        self._session = given_session(values) or make_session(self.node.get_fully_qualified_name())
         self._rewriter = SessionRewriter(self._session)
         self._path = path = Path(values.text("recording"))
         self._start_timeout = values.number("start_timeout") or math.inf
@@ -92,55 +87,50 @@ class RecordedSimulator(Node):
         fixed = values.texts("fixed")
         self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
         self._is_realtime = self._recording.parameters.get("mode") == "realtime"
-        self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self.get_logger())
-        self._report = PlayerReport()
+        self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self.node.get_logger())
         self._open_topics()
 
     def _open_topics(self) -> None:
         rare = (topics.CONFIGURATION, topics.EPISODE)
         of_ticks = tick_topics(self._recording)
-        self._outputs = {topic.name: create_publisher(self, topic) for topic in (*rare, *of_ticks)}
-        self._clock_topic = create_publisher(self, topics.CLOCK)
+        self._outputs = {topic.name: self.node.publisher(topic) for topic in (*rare, *of_ticks)}
+        self._clock_topic = self.node.publisher(topics.CLOCK)
         self._requests = {
-            topic.name: create_publisher(self, topic)
+            topic.name: self.node.publisher(topic)
             for topic in REQUESTS
             if self._repeats and topic.name in self._rare.requested
         }
-        self._parameter_client = self.create_client(
-            SetParametersAtomically, f"{topics.CONTROLLER_NODE}/set_parameters_atomically"
-        )
+        self._controller = self.node.client(topics.CONTROLLER_NODE)
         self._opponent = opponent_of(self._recording)
         if self._opponent:
             topic = topics.JOINT_STATES.under(f"/{self._opponent}")
-            self._outputs[self._opponent] = create_publisher(self, topic)
+            self._outputs[self._opponent] = self.node.publisher(topic)
             self._opponents_states = read_opponent(self._path, self._recording)
         self._late = late_topics(self._recording)
-        self._torques = DirectSubscription(self, topics.JOINT_TORQUES)
+        self._torques = self.node.subscription(topics.JOINT_TORQUES)
 
-    def run(self, stop: StopSignal) -> None:
+    def play(self) -> Turns:
         """Play until the last state is answered, or until `stop`; then write the commands.
 
         Raises:
             RunError: no answer comes, or the controller does not accept a parameter.
         """
-        self._stop, self._executor = stop, PollingExecutor(self)
         try:
             self._publish(topics.CONFIGURATION, self._rare.configurations[0])
-            self._wait(
+            yield from self.wait(
                 self._is_subscribed,
                 lambda: (
                     f"a controller that subscribes to {self._outputs['joint_states'].topic_name} "
-                    f"and publishes {self.resolve_topic_name(topics.JOINT_TORQUES.name)}"
+                    f"and publishes {self.node.resolve_topic_name(topics.JOINT_TORQUES.name)}"
                 ),
                 self._start_timeout,
             )
             for row, messages in enumerate(self._ticks):
-                if stop:
+                if self.stop:
                     break
-                self._play(row, messages)
-                self._report.tell_state(row + 1)
+                yield from self._play_tick(row, messages)
+                self.tell_state(row + 1)
         finally:
-            self._executor.close()
             np.savez(self._file, commands=self._received)
 
     def _publish(self, topic: Topic, raw: bytes) -> bytes:
@@ -159,19 +149,19 @@ class RecordedSimulator(Node):
         """Whether there is a controller, and all that it is sent will reach it."""
         requests = [each for name, each in self._requests.items() if name not in self._late]
         publishers = [self._outputs[topics.JOINT_STATES.name], *requests]
-        if self._changes and not self._parameter_client.service_is_ready():
+        if self._changes and not self._controller.is_ready:
             return False
-        answers = self.count_publishers(topics.JOINT_TORQUES.name)
+        answers = self.node.count_publishers(topics.JOINT_TORQUES.name)
         return bool(answers) and all(each.get_subscription_count() for each in publishers)
 
-    def _play(self, row: int, messages: list[tuple[Topic, bytes]]) -> None:
+    def _play_tick(self, row: int, messages: list[tuple[Topic, bytes]]) -> Turns:
         """Publish the messages of a tick, its state at the end, and wait for the answer."""
         is_answered = bool(self._awaited[row].any())
         begins = row in self._rare.episodes
         if self._is_realtime and not is_answered and not begins:
             return  # the controller never saw it: it took the newest one
         if self._repeats:
-            self._send_requests(row)
+            yield from self._send_requests(row)
         if row and (configuration := self._rare.configurations.get(row)) is not None:
             self._publish(topics.CONFIGURATION, configuration)
         if begins:
@@ -182,11 +172,11 @@ class RecordedSimulator(Node):
         if self._opponent:
             sent.append((self._opponent, self._publish_opponent()))
         if is_answered:  # else the simulator may have gone on without
-            self._wait_for_answer(row, stamp_ns, sent)
+            yield from self._wait_for_answer(row, stamp_ns, sent)
             for change in self._changes.get(row, ()):
-                self._set(change)
+                yield from self.set_parameters(self._controller, topics.CONTROLLER_NODE, change)
 
-    def _wait_for_answer(self, row: int, stamp_ns: int, sent: list[tuple[str, bytes]]) -> None:
+    def _wait_for_answer(self, row: int, stamp_ns: int, sent: list[tuple[str, bytes]]) -> Turns:
         """Take commands until they cover those awaited; `sent` is sent again meanwhile.
 
         A controller that was started for this answers at once with all that it has.
@@ -211,15 +201,15 @@ class RecordedSimulator(Node):
                     self._outputs[name].publish(raw)
             return False
 
-        self._wait(
+        yield from self.wait(
             is_answered,
-            lambda: f"commands that answer the state of {stamp_ns} ns, of {_some(missing())}",
+            lambda: f"commands that answer the state of {stamp_ns} ns, of {some_of(missing())}",
         )
 
     def _take(self, stamp_ns: int) -> CommandArrays | None:
         """The next command that answers a state, if one is there."""
         while (raw := self._torques.take()) is not None:
-            self._executor.received()
+            self.executor.received()
             try:
                 command = self._decoder.decode(raw)
             except MessageError as error:
@@ -230,33 +220,14 @@ class RecordedSimulator(Node):
                 return CommandArrays(command.names, command.effort, 0)
         return None
 
-    def _send_requests(self, row: int) -> None:
+    def _send_requests(self, row: int) -> Turns:
         for name, message in self._rare.requests.get(row, ()):
             publisher = self._requests[name]
-            self._wait(publisher.get_subscription_count, lambda: "controller_node to subscribe")
+            yield from self.wait(
+                publisher.get_subscription_count, lambda: "controller_node to subscribe"
+            )
             publisher.publish(message)
-            if not publisher.is_acknowledged(_ACKNOWLEDGE_TIMEOUT):
-                raise RunError(f"controller_node did not acknowledge a message on '{name}'")
-
-    def _set(self, change: dict[str, Any]) -> None:
-        """Change parameters of the controller, as they were changed then."""
-        future = self._parameter_client.call_async(set_request(change))
-        names = _some(list(change))
-        self._wait(future.done, lambda: f"controller_node to accept {names}")
-        response = future.result() if future.done() else None  # not done when it is to stop
-        if response is not None and not response.result.successful:
-            raise RunError(f"controller_node rejected {names}: {response.result.reason}")
-
-    def _wait(
-        self,
-        condition: Callable[[], object],
-        what: Callable[[], str],
-        timeout: float = ANSWER_TIMEOUT,
-    ) -> None:
-        self._report.begin_wait()
-        while not self._stop and not condition():
-            self._executor.rest()
-            self._report.tell_wait(what, timeout)
+            self.acknowledge(publisher, f"a message on '{name}'")
 
 
 def _needed_commands(recording: Recording) -> BoolArray:
@@ -271,9 +242,3 @@ def _needed_commands(recording: Recording) -> BoolArray:
         needed[:-1] = recording.layout.mask(parameters["commanded_joints"])
         needed[recording.episode_rows[1:] - 1] = False
     return needed
-
-
-def _some(names: list[str]) -> str:
-    """At most three names, and the number of the others, for a message."""
-    shown = ", ".join(f"'{name}'" for name in names[:3])
-    return f"{shown} and {len(names) - 3} more" if len(names) > 3 else shown

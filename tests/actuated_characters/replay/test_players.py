@@ -13,8 +13,9 @@ from actuated_characters.replay.players.controller_parameters import (
     first_parameters,
     parameter_changes,
 )
-from actuated_characters.replay.players.processes import PlayerReport
+from actuated_characters.replay.players.player import Player
 from actuated_characters.replay.players.simulator_inputs import make_inputs
+from msgs_config.bus.in_process import Bus
 from msgs_config.character.file import shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.errors import RecordingError, RunError
@@ -156,15 +157,15 @@ def test_what_is_waited_for_is_told_every_two_seconds_and_then_given_up(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = 100.0
-    clock = "actuated_characters.replay.players.processes.time.monotonic"
-    monkeypatch.setattr(clock, lambda: now)
-    report = PlayerReport()
-    told = []
+    monkeypatch.setattr("actuated_characters.replay.players.player.time.monotonic", lambda: now)
+    player = Player(Bus().node("player", {}))
+    player.stop = False
+    told, waiting = [], player.wait(lambda: False, lambda: "an answer")
     for now in np.arange(100.0, 160.1, 0.5):  # the clock
-        report.tell_wait(lambda: "an answer")
+        next(waiting)
         told += [now] * bool(capsys.readouterr().out)
 
     assert told[0] <= 102.5 and told[-1] >= 157.5 and np.diff(told).max() <= 2.5
     now = 160.5
     with pytest.raises(RunError, match=r"^waited 60 s for an answer$"):
-        report.tell_wait(lambda: "an answer")
+        next(waiting)
