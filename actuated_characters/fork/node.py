@@ -197,16 +197,29 @@ class ForkNode(Player):
         simulator = self._clients[topics.SIM_NODE]
         yield from self.call(simulator, topics.SIM_NODE, name, flag=flag, timeout=timeout)
 
-    def _wait(
-        self, condition: Callable[[], bool], what: str, timeout: float = ANSWER_TIMEOUT
+    def wait(
+        self,
+        condition: Callable[[], object],
+        what: Callable[[], str],
+        timeout: float = ANSWER_TIMEOUT,
     ) -> Turns:
-        """Wait for a condition, after having compared the states that have come."""
+        """Wait for a condition, and compare the states that come meanwhile.
+
+        Raises:
+            ReplayError: see `play`.
+            RunError: it has taken longer than the timeout in s.
+        """
 
         def holds() -> bool:
             self._take_messages()
-            return condition()
+            return bool(condition())
 
-        yield from self.wait(holds, lambda: what, timeout)
+        yield from super().wait(holds, what, timeout)
+
+    def _wait(
+        self, condition: Callable[[], object], what: str, timeout: float = ANSWER_TIMEOUT
+    ) -> Turns:
+        yield from self.wait(condition, lambda: what, timeout)
 
     def _take_messages(self) -> None:
         """Take the states and torques that have come, of the session of this run."""

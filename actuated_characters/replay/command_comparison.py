@@ -16,7 +16,7 @@ class JointDifference:
     """The differences of one joint's effort over all ticks that were compared, N m or N."""
 
     name: str
-    mean: float  # of the size of the difference
+    mean: float  # mean size of the difference
     largest: float
     recorded: float  # the mean size of what was recorded, to compare the two with
 
@@ -25,7 +25,7 @@ class JointDifference:
 class CommandComparison:
     """The outcome of a comparison of commands."""
 
-    states: int  # to which the answers were compared
+    states: int  # states whose answers were compared
     first: Difference | None  # the first that is not the same to the last bit
     largest: Difference | None
     joints: tuple[JointDifference, ...]  # of the joints that are commanded

@@ -22,7 +22,7 @@ from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import RATE
 
 POSITION, VELOCITY, EFFORT = "position", "velocity", "effort"
-QUANTITIES = (EFFORT, POSITION, VELOCITY)  # of equal ticks the effort differs first: it is a cause
+QUANTITIES = (EFFORT, POSITION, VELOCITY)  # within a tick the effort comes first, as the cause
 
 States: TypeAlias = Mapping[str, FloatArray]
 """Arrays (m, n) of m states of n degrees of freedom by quantity: rad, m, rad/s, m/s, N m, N."""
@@ -41,12 +41,12 @@ _MOTION = (
 class Difference:
     """A number that is not the recorded one; `str` of it is one line."""
 
-    tick: int  # of the message that has the number
-    stamp_ns: int  # of the same message
+    tick: int  # tick of the message that has the number
+    stamp_ns: int  # stamp of the message that has the number
     quantity: str  # such as "position"
-    name: str  # of the degree of freedom, link or ball
+    name: str  # name of the degree of freedom, link or ball
     recorded: float
-    found: float  # in the replay
+    found: float  # the number in the replay
     sentence: str  # describes it, without tick and character
     character: str = ""  # `Recording.name`
 
@@ -66,7 +66,7 @@ class ReplayResult:
     """The outcome of a replay."""
 
     difference: Difference | None  # the first one, None if all is identical or within tolerance
-    states: int  # that were compared, of each character
+    states: int  # states of each character that were compared
     episodes: int
     state_hashes: Mapping[str, str]  # of the replayed states, by `Recording.name`
     largest: Mapping[str, float] = field(default_factory=dict)  # differences by unit
@@ -185,7 +185,10 @@ def _state_difference(
 def _values(recording: Recording, quantity: str, rows: slice) -> FloatArray:
     """A quantity (m, n) of some states as recorded; an effort is that of the tick before."""
     if quantity == EFFORT:
-        return np.vstack((np.full((1, recording.layout.size), np.nan), recording.effort))[rows]
+        first, end, _ = rows.indices(len(recording.position))
+        efforts = recording.effort[max(first - 1, 0) : max(end - 1, 0)]
+        nothing = np.full((int(first == 0 < end), recording.layout.size), np.nan)
+        return np.concatenate((nothing, efforts))
     return recording.position[rows] if quantity == POSITION else recording.velocity[rows]
 
 

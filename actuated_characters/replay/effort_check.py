@@ -22,7 +22,7 @@ from msgs_config.errors import LayoutError
 from msgs_config.parameters import Values
 from sim_node.node_settings import make_node_settings
 
-_ARRIVAL_TICKS = 2  # by which the arrival of a command without a stamp is uncertain
+_ARRIVAL_TICKS = 2  # ticks by which the arrival of a command without a stamp is uncertain
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,17 @@ class CommandCheck:
     """The outcome of a check of a recording's efforts against its commands."""
 
     difference: Difference | None  # the first effort that no command can have led to
-    silent_stamps_ns: tuple[int, ...]  # of states to which the recording has not all commands
+    silent_stamps_ns: tuple[int, ...]  # stamps of states to which the recording lacks commands
 
 
 class _RecordedTick(NamedTuple):
     """A tick of the lockstep, and the commands that it may have applied."""
 
-    row: int  # of its effort, and of the state that it begins with
+    row: int  # row of its effort, and of the state that it begins with
     answered: int | None  # row of the state whose commands act; None before the first ones do
     previous: FloatArray  # (n,) what was commanded in the tick before
-    collected: FloatArray  # (n,) what the commands add up to, of equal entries the first one
-    silent: BoolArray  # (n,) must have been commanded, by a command that was not recorded
+    collected: FloatArray  # (n,) what the commands add up to; of several with an entry, the first
+    silent: BoolArray  # (n,) entries of a command that there must have been but was not recorded
 
 
 def first_uncommanded(recordings: Sequence[Recording]) -> tuple[Difference | None, list[str]]:
@@ -168,7 +168,7 @@ class _Check:
                     continue
                 for candidate, effort in zip(candidates, clipped, strict=True):
                     if not different_bits(effort[entries], applied[entries]).any():
-                        tick.collected[entries] = candidate[entries]  # `hold` holds it next
+                        tick.collected[entries] = candidate[entries]  # `hold` repeats it next
                         break
                 else:
                     return self._difference(tick, entries.start, clipped[0])

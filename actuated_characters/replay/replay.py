@@ -97,7 +97,7 @@ def _replay_world(
     stamps_ns, last = together[0].stamps_ns, len(together[0].effort)
     if uncommanded is not None and uncommanded.stamp_ns > stamps_ns[-1]:
         uncommanded = None
-    if uncommanded is not None:  # then what comes before it is of interest alone
+    if uncommanded is not None:  # only what comes before that effort is compared
         last = int(np.searchsorted(stamps_ns, uncommanded.stamp_ns)) - 1
     with make_simulation(together, int(stamps_ns[0])) as simulation:
         world = _ReplayedWorld(together, simulation, is_exact=tolerance is None)
@@ -117,7 +117,7 @@ class _ReplayedWorld:
             (recording, simulated, list[StampedState]())
             for recording, simulated in zip(together, simulation.characters, strict=True)
         ]
-        self._lead = together[0]  # of which balls and resets are taken
+        self._lead = together[0]  # the recording that balls and resets are taken from
 
     def found(self) -> list[States]:
         """The states so far, of each character."""

@@ -86,7 +86,7 @@ def replay_commands(
         try:
             wait_for_player(player, [simulator], progress, tell)
         except RunError as error:
-            failure = error  # of what differs, if anything does
+            failure = error  # matters only if nothing is found to differ
         found = _found_states(player, file, len(together))
     remarks += [_APPLIED] if are_applied else []
     result = compare_world(together, found, tolerance, remarks) if found else None
@@ -169,7 +169,7 @@ def replay_states(
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes(own=start) as children:
         others = []
-        # one that is started may be anywhere, unless it listens to the namespace beside its own
+        # A started controller may be anywhere, unless it listens to the namespace beside its own.
         namespace = "" if start and not opponent_of(recording) else recording.name
         if start:
             parameters = _controller_parameters(children.directory, recording) | settings | session

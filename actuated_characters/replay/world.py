@@ -23,7 +23,7 @@ from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import change_world, make_character_setup, make_simulation_settings
 
 _GROUNDS = ("plane", "none")
-_MOST_BEHIND = 1  # states by which a recorder that is stopped may have more of one than of another
+_MOST_BEHIND = 1  # states that a stopped recorder may have more of one character than of another
 
 
 def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
@@ -76,7 +76,7 @@ class ResetChanges:
     """What is different from an episode on."""
 
     world: WorldSettings
-    states: Mapping[str, StampedState]  # in which characters begin, by their names in the world
+    states: Mapping[str, StampedState]  # where characters begin, by their names in the world
 
 
 def changes_of_reset(

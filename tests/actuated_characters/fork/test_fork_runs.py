@@ -12,6 +12,7 @@ from actuated_characters.bags.recording import Recording, read_recording, read_r
 from actuated_characters.cli import main
 from actuated_characters.replay.replay import replay
 from actuated_characters.report.contents import read_contents
+from msgs_config.messages import topics
 from tests.support.recorded_nodes import (
     record_eventful,
     record_foreign,
@@ -180,6 +181,16 @@ def test_a_parameter_counts_from_the_tick_on_and_a_fork_forks(reactive: Path) ->
     assert not any(forked.throws)
     again = fork(directory, 0.9, name="again")
     assert hash_of(again) == hash_of(directory)
+
+
+def test_more_states_than_a_queue_holds_are_compared(folder: Path) -> None:
+    original = folder / "long"
+    given = ("--set", "sim_node.initial_position:=[0.5]", "--in-process")
+    seconds = 1.1 * topics.JOINT_STATES.quality.depth / RATE
+    options = ["--character", "pendulum", "--duration", f"{seconds:g}", *given]
+    assert main(["run", *options, "--output", str(original)]) == 0
+
+    assert hash_of(fork(original, seconds - 0.1)) == hash_of(original)
 
 
 def test_files_that_are_gone_are_written_again_from_the_recording(folder: Path) -> None:
