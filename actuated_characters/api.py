@@ -74,7 +74,7 @@ class Controller:
         self._controller = controller_parameters.make_controller(
             self.character, motion.reference, self._values
         )
-        self._last: StampedState | None = None  # that was answered
+        self._last: StampedState | None = None  # the last state that was answered
         self._episode_ns = 0
         joints = controller_parameters.commanded_joints(self.character, self._values)
         self._commanded = self.character.layout.mask(joints)
@@ -145,9 +145,9 @@ class SimulationSnapshot:
 
     character: tuple[str, ...]  # its file's name, and those of its degrees of freedom
     world: simulation.Snapshot
-    first_tick: int  # of the episode
-    pushes: tuple[ExternalWrench, ...]  # that wait or act
-    states: StateHash  # over the states so far
+    first_tick: int  # number of the episode's first tick
+    pushes: tuple[ExternalWrench, ...]  # pushes that wait for their time, or still act
+    states: StateHash  # hash over all states so far
 
 
 class Simulation:
@@ -383,7 +383,7 @@ def run(
     controller: Mapping[str, object] = _NOTHING,
     **reference: object,
 ) -> dict[str, object]:
-    """Run simulator, controller and recorder as processes over topics; returns the figures.
+    """Run simulator, controller and recorder, by default over topics; returns the figures.
 
     Args:
         character: Name of one that ships, or path of its YAML or URDF file.

@@ -37,7 +37,7 @@ from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_
 from msgs_config.runtime.ros_environment import check_domain_id
 
 _EXIT_INTERRUPTED = 130
-_RUN = "run"  # without a word of what to run
+_RUN = "run"  # this command alone prints the overview
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ActuatedCharactersError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except BaseException:  # a module that was being imported may have turned it into its own
+    except BaseException:  # an interrupted import may have raised an error of its own
         if not was_interrupted():
             raise
         print("interrupted", file=sys.stderr)
@@ -119,7 +119,7 @@ def _parameters(options: argparse.Namespace) -> None:
         if console.is_terminal:
             console.print(f"[bold]{escape(parameter.name)}[/bold]: {escape(value)}")
             console.print(Padding(escape(about), (0, 0, 0, 4)))
-        else:  # a line each, to be searched
+        else:  # a line for each parameter, so that they can be searched
             print(f"{parameter.name}: {value}  {about}")
 
 

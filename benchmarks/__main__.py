@@ -49,9 +49,9 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help="store the ratios as those to keep")
     options = parser.parse_args()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.update(middleware_settings(os.environ))  # as its nodes: else it may not hear them
+    os.environ.update(middleware_settings(os.environ))  # as for its nodes, or it may not hear them
     console, ratios = Console(width=_WIDTH), []
-    stored = read_ratios()  # before all that takes minutes: it may be malformed
+    stored = read_ratios()  # before all that takes minutes: the file may be malformed
     with own_domain() as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         for name, measure in _MEASUREMENTS.items():

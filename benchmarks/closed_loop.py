@@ -16,7 +16,7 @@ def in_process(plan: RunPlan) -> FloatArray:
     times = [time.perf_counter()]
     for _ in ticks_in_process(plan):
         times.append(time.perf_counter())
-    return np.diff(times)[1:]  # the first one builds the world, too
+    return np.diff(times)[1:]  # the first tick builds the world, too
 
 
 def over_topics(plan: RunPlan, *, composed: bool = False) -> list[dict[str, str]]:
@@ -31,7 +31,7 @@ def over_topics(plan: RunPlan, *, composed: bool = False) -> list[dict[str, str]
             return nodes.reports
         nodes.start(topics.SIM_NODE, plan.simulator)
         if not plan.simulator.integer("wait_for_subscribers"):
-            nodes.wait_until(lambda: nodes.reports)  # they are heard from now on
+            nodes.wait_until(lambda: nodes.reports)  # the simulator's reports are heard from now on
         nodes.start(topics.CONTROLLER_NODE, plan.controller)
         nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)
         return nodes.reports

@@ -67,7 +67,7 @@ def _wall_time(workers: int) -> float:
     """Wall seconds a simulated second of the walk in this process."""
     settings: dict[str, object] = {"planner": "predictive", "plan.workers": workers}
     ticks = ticks_in_process(make_plan("humanoid", _DURATION, _WALK, {}, settings))
-    next(ticks)  # all is made and compiled, and the first plan has many rounds
+    next(ticks)  # the first tick makes and compiles all, and its plan has many rounds
     started = time.perf_counter()
     count = sum(1 for _ in ticks)
     return (time.perf_counter() - started) * _RATE / count

@@ -16,7 +16,7 @@ from msgs_config.messages import topics
 CHARACTER, RATE = "humanoid", 1000  # Hz
 _DURATION = 6.0  # s of simulated time of one run
 _REAL_TIME_DURATION = 10.0  # s
-_PAIRS = 5  # of runs with and without a recorder
+_PAIRS = 5  # pairs of runs with and without a recorder
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Timing:
     """What one run took."""
 
     ticks_per_s: float
-    share: float  # of a core, that the recorder had; 0 without one
+    share: float  # share of a core that the recorder had; 0 without one
 
 
 def walk(duration: float) -> RunPlan:

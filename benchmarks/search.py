@@ -16,7 +16,7 @@ from controller_node.references.clip import ClipReference
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import read_clip
 
-_STATES = 30  # of a walk, each looked for once
+_STATES = 30  # states of a walk, each looked for once
 _LASTING = 0.5  # s, the default of `blend.duration`
 
 

@@ -23,8 +23,8 @@ from tests.support.page_client import PageClient
 _CHARACTER = "humanoid"
 _DURATION = 3600.0  # s of simulated time, more than is needed
 _PORT = 18080
-_PAIRS = 4  # of times that are watched and not, in one run
-_REPORTS = 3  # of the simulator, one a second, for each time
+_PAIRS = 4  # pairs of a time that is watched and one that is not, in one run
+_REPORTS = 3  # reports of the simulator, one a second, in each time
 
 Watching = Callable[[], AbstractContextManager[PageClient | None]]
 
@@ -34,7 +34,7 @@ class Timing:
     """What was measured between two reports of the simulator."""
 
     ticks_per_s: float
-    share: float  # of a core, that the viewer had
+    share: float  # share of a core that the viewer had
     pictures_per_s: float = 0.0
 
 
@@ -76,7 +76,7 @@ def _measure(plan: RunPlan, *, composed: bool) -> Iterator[tuple[str, list[tuple
             nodes.start_composed(plan.simulator, plan.controller)
         else:
             nodes.start(topics.SIM_NODE, plan.simulator)
-            nodes.wait_until(lambda: nodes.reports)  # they are heard from now on
+            nodes.wait_until(lambda: nodes.reports)  # the simulator's reports are heard from now on
             nodes.start(topics.CONTROLLER_NODE, plan.controller)
         nodes.wait_until(lambda: _tick(nodes) > 1)
         yield "headless client", _pairs(nodes, viewer, partial(_client, nodes))
@@ -87,7 +87,7 @@ def _measure(plan: RunPlan, *, composed: bool) -> Iterator[tuple[str, list[tuple
 @contextmanager
 def _client(nodes: Nodes) -> Iterator[PageClient]:
     with PageClient(_PORT) as page:
-        nodes.wait_until(lambda: page.pictures > 10)  # the scene is there
+        nodes.wait_until(lambda: page.pictures > 10)  # the whole scene has come
         yield page
 
 
@@ -99,7 +99,7 @@ def _browser(nodes: Nodes) -> Iterator[None]:
     ):
         browser.open(f"http://127.0.0.1:{_PORT}")
         begun = time.monotonic()
-        nodes.wait_until(lambda: time.monotonic() > begun + 10.0)  # it has drawn for a while
+        nodes.wait_until(lambda: time.monotonic() > begun + 10.0)  # the browser has drawn a while
         yield None
 
 

@@ -16,11 +16,11 @@ from msgs_config.character.model import Character, ShapeType
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.geometry import fixed_order, rotations
 
-_ROOT_ENTRIES = 6  # of the floating base, the first ones
-_LEAST_LOAD = 1.0  # N on the feet together, where the law would have them pull
-_MOST_LOAD = 2.0  # weights, on the feet together
+_ROOT_ENTRIES = 6  # entries of the floating base, the first ones
+_LEAST_LOAD = 1.0  # N, the least load on both feet, where the law would have them pull
+_MOST_LOAD = 2.0  # weights, the largest load on both feet
 _FULL_FOOTING, _NO_FOOTING = 0.75, 0.5  # cosines of a sole's tilt: 41 and 60 degrees
-_LEAST_TIPPING = 1e-9  # N m^2, where the feet are in one place
+_LEAST_TIPPING = 1e-9  # N m^2, the least divisor, where the feet are in one place
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class BalanceController:
         soles = [
             _sole(character, model, foot, turn) for foot, turn in zip(self._feet, axes, strict=True)
         ]
-        # of each sole in the frame of its link: the middle (3,), the directions of its edges as
-        # columns (3, 2), half their lengths (2,), m, and the normal (3,), away from the ground
+        # Of each sole in the frame of its link: the middle (3,), the directions of its edges as
+        # columns (3, 2), half their lengths (2,), m, and the normal (3,), away from the ground.
         self._centres, self._edges, self._half_lengths, self._normals = (
             np.array(part) for part in zip(*soles, strict=True)
         )
@@ -184,7 +184,7 @@ def _sole(character: Character, model: DynamicsModel, foot: int, axes: FloatArra
         raise CharacterError(f"{character.file}: the foot '{link.name}' has no box, so no sole")
     pose, half = boxes[0].pose, 0.5 * np.array(boxes[0].size)
     turn = rotations.matrix(np.array(pose.orientation_xyzw))
-    heights = fixed_order.apply(turn.T, axes[2])  # of the box's axes above its middle
+    heights = fixed_order.apply(turn.T, axes[2])  # z components in the world of the box's axes
     normal = int(np.argmax(np.abs(heights)))
     up = np.copysign(1.0, heights[normal]) * turn[:, normal]
     others = [axis for axis in range(3) if axis != normal]

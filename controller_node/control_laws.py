@@ -1,7 +1,7 @@
 """The control laws: their equations, as pure functions to a generalised effort (n,), and by name.
 
 Errors are those of `JointLayout.difference`: in rad or m, a rotation's as a rotation vector in the
-child frame. Efforts are in N m or N, in the frames of docs/design.md. A law without stiffness or
+child frame. Efforts are in N m or N, in the frames of docs/topics.md. A law without stiffness or
 integral gain is the one with those gains at zero. A new law is a function of `LawContext`,
 `TrackingInput` and `GainArrays` under `@_LAWS.register(NAME)`.
 """

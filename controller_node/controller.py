@@ -86,11 +86,14 @@ class Controller:
         self._choice = behaviour or BehaviourChoice()
         self.check(settings)
         self._settings = settings
-        self._limits = EffortLimits(self.layout, settings.gains.effort_limits)  # those met last
-        self.needs_contacts = self._choice.needs_contacts  # of the tick before, to answer a state
+        # The limits of the gains that were in force last.
+        self._limits = EffortLimits(self.layout, settings.gains.effort_limits)
+        # Whether the answer to a state needs the contacts of the tick before.
+        self.needs_contacts = self._choice.needs_contacts
         self.opponent = self._choice.opponent  # the character whose place it needs too; or none
         self._own_reference = reference
-        self.is_steered = isinstance(reference, SteeredReference)  # by velocities
+        # Whether commanded velocities steer the reference.
+        self.is_steered = isinstance(reference, SteeredReference)
         self._no_contacts = np.zeros((len(character.links), 6))
         self.begin_episode(0)  # until a state says of which episode it is
 
@@ -138,7 +141,7 @@ class Controller:
         self._settings = settings
         self._effective = None
         self._tracked.follows_velocity = settings.follows_velocity
-        self._change_reference()  # its velocity may count, or no longer
+        self._change_reference()  # the reference's velocity may count now, or no longer
 
     def check(self, settings: ControllerSettings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""

@@ -47,8 +47,8 @@ class EffectiveGains:
     """The gains in force until settings or strengths change."""
 
     from_messages: FloatArray  # (b,) the strengths that messages set
-    strengths: FloatArray  # (b,) those times the settings' own
-    gains: GainArrays  # the settings' times these
+    strengths: FloatArray  # (b,) those of messages times the settings' own
+    gains: GainArrays  # the settings' gains times these strengths
     assisted: bool  # whether the gains drive a floating base
 
 

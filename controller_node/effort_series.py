@@ -89,7 +89,7 @@ def _parse(layout: JointLayout, file: Path, rows: Iterator[list[str]]) -> Effort
 
 def _numbers(file: Path, rows: Iterable[list[str]], columns: int) -> FloatArray:
     """The numbers (t, columns) of the rows below the header, times first."""
-    numbers = array("d")  # a file of a few MB is many rows
+    numbers = array("d")  # takes less memory than a list: a file of a few MB has many rows
     for line, row in enumerate(rows, start=2):
         try:
             values = [float(text) for text in row]

@@ -10,8 +10,8 @@ from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 from msgs_config.messages.probe import DynamicsSample
 
-_MAX_DIFFERENCE = 0.01  # where the two engines themselves differ by less than a millionth
-_SINGULAR = 1e-6  # of all that a joint moves: the part that joints before it do not move
+_MAX_DIFFERENCE = 0.01  # a share; the two engines themselves differ by less than a millionth
+_SINGULAR = 1e-6  # least share of a joint's inertia that the joints before it do not move
 _TINY_DIVISOR = 1e-150  # keeps 0 / 0 away
 
 

@@ -81,8 +81,8 @@ class ControllerNode(ComposableNode):
         self._awaited = AwaitedMessages(
             self.node, controller, self._character, self._simulators, logger
         )
-        self._pending_state: bytes | None = None  # a state, for what is awaited with it
-        # after them: a simulator that has found this subscription has found the others as well
+        self._pending_state: bytes | None = None  # a state whose other messages are awaited
+        # After all others: a simulator that has found this one has found the others as well.
         self._states = self.node.subscription(topics.JOINT_STATES)
         self._outputs = Publishers(
             self.node, self._layout, self._setups.in_force.driven, self._simulators.bound
@@ -254,9 +254,9 @@ class ControllerNode(ComposableNode):
         from the latched topic, once.
         """
         if state.effort is None:
-            self._simulators.look(time.monotonic())  # a changed configuration came before it
+            self._simulators.look(time.monotonic())  # a changed configuration came before the state
             if self._simulators.bound is None:
-                return None  # it was not the one that this controller was made for
+                return None  # not the simulator that this controller was made for
             self._begin_episode(state.stamp_ns)
         elif self._episode_ns is None:
             found_ns = self._simulators.episode_before(state.stamp_ns)

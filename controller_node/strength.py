@@ -72,7 +72,8 @@ class StrengthSchedule:
         if len(self._pending) >= _MOST_WAITING:
             raise MotionError(f"strength: more than {_MOST_WAITING} are yet to begin")
         self._pending.append(strengths)
-        self._pending.sort(key=lambda strengths: strengths.start_ns)  # stable
+        # The sort is stable: of one stamp the later strengths come last.
+        self._pending.sort(key=lambda strengths: strengths.start_ns)
 
     def at(self, stamp_ns: int) -> FloatArray:
         """The strengths (b,) at a stamp; stamps must not go back."""

@@ -33,9 +33,9 @@ class TrackedReference:
         self.follows_velocity = True  # the reference's; else the velocity to track is zero
         self.target: Target | None = None  # of a behaviour, instead of the reference itself
         self._character, self._reference, self._clock = character, reference, clock
-        self._together = _sampled_together(reference)  # the same one, if it can do that
+        self._together = _sampled_together(reference)  # None: it samples one state at a time
         self._first_tick = clock.first_tick_from(episode_ns)
-        self._known_from, self._known = 0, list[TimedState]()  # a tick, states from there on
+        self._known_from, self._known = 0, list[TimedState]()  # a tick, the states from there on
 
     def tick(self, stamp_ns: int) -> int:
         """Ticks from the episode's first state to the first tick from a stamp on."""

@@ -22,7 +22,7 @@ TITLE = "the walk by strength of root force and torque"
 RUNS = 7
 
 _CHARACTER = "humanoid"
-_STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # of root force and torque
+_STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # factors of root force and torque
 _DURATION = 5.0  # s
 _SMALLEST = 0.003  # where no assistance is drawn on an axis that has no zero
 _PICTURES, _SIZE = 8, (190, 240)
@@ -117,7 +117,7 @@ def _draw(result: StudyResult, runs: Mapping[str, Recording]) -> None:
     full = assisted[0][1]
     heights.plot(full.times, full.reference_position[:, 2], "k--", label="reference")
     label(heights, "time (s)", "root height (m)", legend="center right")
-    heights.set_xlim(right=1.3 * _DURATION)  # for the legend
+    heights.set_xlim(right=1.3 * _DURATION)  # leaves room for the legend
 
 
 def _draw_poses(result: StudyResult, none: Recording, full: Recording) -> None:

@@ -25,7 +25,7 @@ _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
 _PUSHED, _STANDING = 6.0, 60.0  # s, length of the runs
 _LINK = "chest"
 _MAX_IMPULSE, _IMPULSE_RESOLUTION = 32.0, 0.5  # N s
-_STANDS = 0.8  # of the height at the beginning
+_STANDS = 0.8  # share of the height at the beginning
 _UPRIGHT = 0.7  # cosine of the trunk's tilt
 _DIRECTIONS = {
     "forward": (1.0, 0.0),

@@ -25,10 +25,10 @@ RUNS = 15
 
 _CHARACTER = "humanoid"
 _DURATION = 10.0  # s
-_BOUNDS = {"walk": 0.08, "punch": 0.25}  # rad, of the mean joint error ...
-_BOUND = 0.12  # ... and of the other clips
+_BOUNDS = {"walk": 0.08, "punch": 0.25}  # rad, bounds of the mean joint error
+_BOUND = 0.12  # rad, bound of the mean joint error of the other clips
 _TOUCH = 0.01  # m above the ground, below which a link of the capture is on it
-_EACH = 4  # states from one to the next that is looked at for what is on the ground
+_EACH = 4  # every fourth state is looked at for what is on the ground
 _PICTURED = {"walk": 1.3, "backflip": 1.75, "cartwheel": 2.72, "punch": 2.2}  # s from the start
 _PICTURES, _SIZE = 8, (190, 240)
 
@@ -69,7 +69,7 @@ def clearances(character: Character, positions: FloatArray) -> Mapping[str, Floa
     for row, position in enumerate(positions):
         model.update(position, still)
         heights[row] = lowest_heights(character, model)
-    touching = np.isfinite(heights[0])  # others have nothing to touch the ground with
+    touching = np.isfinite(heights[0])  # other links have nothing to touch the ground with
     return {link.name: heights[:, k] for k, link in enumerate(character.links) if touching[k]}
 
 
@@ -119,7 +119,7 @@ def _draw(result: StudyResult) -> None:
     twin.set_ylabel("root force / weight")
     twin.legend(loc="upper right", fontsize="small")
     for panel in (others, twin):
-        panel.margins(y=0.2)  # for the legends
+        panel.margins(y=0.2)  # leaves room for the legends
     label(others, "", "root error (m)", legend="upper left")
     others.set_xticks(places, clips, rotation=30, ha="right")
 
@@ -130,7 +130,7 @@ def _draw_poses(result: StudyResult, recordings: Mapping[str, Recording]) -> Non
     for clip, recording in recordings.items():
         if clip not in _PICTURED:
             continue
-        last = min(_PICTURED[clip], float(recording.times[-2]))  # the last has no ghost
+        last = min(_PICTURED[clip], float(recording.times[-2]))  # the last state has no ghost
         times = np.linspace(0.0, last, _PICTURES).tolist()
         picture = strip(recording, times, ghost=True, size=_SIZE)
         pictures[f"{clip}; the capture in green"] = picture

@@ -27,7 +27,7 @@ _CASES = (
     RunSpec("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
 )
 
-_SMALLEST = 1e-17  # that a logarithmic axis shows
+_SMALLEST = 1e-17  # least value that a logarithmic axis shows
 _PARTS = ("M (v' - v) / h", "C", "f", "J^T contacts")
 
 
@@ -37,7 +37,7 @@ class Closure:
 
     times: FloatArray  # (t,) s
     relative: FloatArray  # (t,) norm of the residual, without limits, over the largest part
-    without_contacts: FloatArray  # (t,) the same, the contacts left out
+    without_contacts: FloatArray  # (t,) as `relative`, the contacts left out
     parts: FloatArray  # (t, 4) norms, of `_PARTS`
 
 

@@ -27,7 +27,7 @@ _PUSH_TIME, _PUSH_DURATION, _IMPULSE = 1.0, 0.1, 0.5  # s, s, N s
 _LAST_SECONDS = 0.5  # s, at the end of a run
 _STRIP_TIMES = (0.9, 1.2, 1.5, 1.8, 2.1, 3.0)  # s
 _TILE = (240, 260)  # pixels of a picture in the strip
-_LEAST_ERROR = 1e-5  # rad; what is shown of less
+_LEAST_ERROR = 1e-5  # rad; a smaller error is shown as this one
 _DURATION = 4.0  # s
 _SIMULATOR = {"rate": _RATE, "wrench_duration": _PUSH_DURATION}
 _SINE = {"reference": "sine", "sine.amplitude": 0.3, "sine.frequency": 0.5}
@@ -36,7 +36,7 @@ _CLOSED = {  # loops, by the link that is pushed
     "lbr_iiwa_link_7": RunSpec("kuka-closed", "kuka", _DURATION, _SINE, _SIMULATOR, _ARM_LAW),
     "chest": RunSpec("humanoid-closed", "humanoid", _DURATION, WALK, _SIMULATOR, _WALK_LAW),
 }
-_STYLES: Mapping[tuple[str, bool], dict[str, Any]] = {  # of the loops, left alone and pushed
+_STYLES: Mapping[tuple[str, bool], dict[str, Any]] = {  # by loop, and whether it is pushed
     ("closed", False): {"color": "tab:blue", "linewidth": 5.0, "alpha": 0.35},
     ("open", False): {"color": "black", "linestyle": ":", "linewidth": 1.5},
     ("closed", True): {"color": "tab:blue", "linewidth": 1.2},

@@ -45,14 +45,14 @@ _KEYFRAMES: Mapping[float, Mapping[str, float]] = {  # the arm's: time in s, ang
         "lbr_iiwa_joint_5": 0.5,
     },
 }
-_A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip
+_A_CYCLE, _CYCLES = 12, 1.5  # keyframes a cycle of the clip, cycles
 
 
 @dataclass(frozen=True)
 class _Inverse:
     """The inverse dynamics of a motion at a rate."""
 
-    case: RunSpec  # that feeds it forward
+    case: RunSpec  # the run that feeds it forward
     rate: int  # Hz
     times: FloatArray  # (t,) s
     efforts: FloatArray  # (t, n)
@@ -211,7 +211,7 @@ def orders(periods: Sequence[float], errors: Sequence[float]) -> list[float]:
 def _add_notes(
     result: StudyResult, arms: Sequence[_Return], whole: Sequence[_Return], cycle: float
 ) -> None:
-    inverse, start = whole[-1].inverse, cycle / _A_CYCLE  # when the walk has set off from rest
+    inverse, start = whole[-1].inverse, cycle / _A_CYCLE  # `start`: the walk has set off from rest
     in_cycle = (inverse.times >= start) & (inverse.times < start + cycle)
     vertical = float(inverse.efforts[in_cycle, 2].mean())
     result.remarks += [

@@ -22,10 +22,10 @@ RUNS = 10
 
 _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
-_SETTLED = 0.5  # s; what is before is the start
+_SETTLED = 0.5  # s; the time before is the start
 _LONGEST_LAG = 0.4  # s
 _SHOWN_SECONDS = 3.0  # s
-_FACTORS = {  # of stiffness and damping; the lecture's two rows of three pictures
+_FACTORS = {  # factors of stiffness and damping; the lecture's two rows of three pictures
     "normal stiffness": (1.0, 1.0),
     "small stiffness": (0.1, 1.0),
     "large stiffness": (10.0, 1.0),
@@ -88,10 +88,10 @@ def _knee(run: Recording, factors: tuple[float, float]) -> FloatArray:
     Rows of an array (4, t).
     """
     entry, gains = run.layout.joint(_KNEE).start, run.character.gains[_KNEE]
-    reference = run.reference_position[:-1, entry]  # the last state may have none
+    reference = run.reference_position[:-1, entry]  # the last state may have no reference
     theory = inertialess_response(
         reference,
-        run.reference_velocity[:-1, entry],  # zero where it is not followed
+        run.reference_velocity[:-1, entry],  # zero where the reference velocity is not followed
         factors[0] * gains.stiffness,
         factors[1] * gains.damping,
         1.0 / _RATE,

@@ -29,8 +29,8 @@ RUNS = 5
 
 _RATE, _FINE_RATE = 240, 1920  # Hz
 _DURATION = 2.0  # s
-_SMALLEST = 1e-18  # that is drawn where there is nothing
-_TORQUE = 0.15  # N m, largest
+_SMALLEST = 1e-18  # what is drawn where there is nothing
+_TORQUE = 0.15  # N m, the largest torque
 _FORCE = 0.5  # N, of the root in the run with assistance
 _PARENT = Box("parent", 2.0, (0.15, 0.1, 0.6), (0.0, 0.0, 0.3))
 _CHILD = Box("child", 1.0, (0.1, 0.1, 0.5), (0.05, 0.0, -0.25))
@@ -123,7 +123,7 @@ def _run(
     boxes: str,
     name: str,
     *,
-    torque: float = 1.0,  # times the profile
+    torque: float = 1.0,  # factor of the torque's profile
     force: float = 0.0,  # N, of the root along x
     rate: int = _RATE,
     pushes: Sequence[PlannedPush] = (),

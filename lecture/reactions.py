@@ -27,7 +27,7 @@ _AROUND = 0.05  # s before and after the hit between which the ball's momentum i
 _AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_POSES = {  # of a run: what is seen, and when, s
+_POSES = {  # for each run: what is seen, and when, s
     "ragdoll": (
         "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
         (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
@@ -118,7 +118,8 @@ def measure(run: Recording, alone: Recording, hit: float) -> HitEffects:
     usual = joint_errors(alone, alone.reference_position).mean(axis=1)[alone.times >= hit]
     displacement = np.linalg.norm(run.position[:, :3] - alone.position[states, :3], axis=1)
     times, after = run.times, run.times >= hit
-    is_off = np.flatnonzero(after & (error > _AS_BEFORE * np.nanmax(usual)))  # the last has none
+    # The last state has no error.
+    is_off = np.flatnonzero(after & (error > _AS_BEFORE * np.nanmax(usual)))
     last = int(is_off[-1]) if len(is_off) else None
     back: float | None = 0.0
     if last is not None:
@@ -174,7 +175,7 @@ def _draw(
     """Two panels an impulse: the root's displacement and the joint error, and the modes."""
     title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"
     panels = result.add_panels(result.name, len(hits), 2, (11.0, 9.0), title=title, same_x="row")
-    marks, modes = Marks(), list[tuple[float, float, str]]()  # of all of them, for the legend
+    marks, modes = Marks(), list[tuple[float, float, str]]()  # those of all hits, for the legend
     usual = joint_errors(alone, alone.reference_position).mean(axis=1)
     for (impulse, run), (moved, error) in zip(
         hits.items(), zip(panels[::2], panels[1::2], strict=True), strict=True

@@ -122,7 +122,7 @@ def read_xml(path: Path, error: type[ActuatedCharactersError]) -> XmlText:
     """
     raw = _read_bytes(path, error, None)
     text, misread = _decode_xml(path, raw)
-    text = text.rstrip("\0")  # in which PyBullet's own files end
+    text = text.rstrip("\0")  # PyBullet's own files end in NUL
     if "\0" in text:
         raise error(f"{path}: not a text file")
     return XmlText(_universal_newlines(text), misread)

@@ -30,7 +30,7 @@ def _plain_item(value: object) -> object:
     if isinstance(value, bool):
         return value
     if isinstance(value, str):
-        return str.__str__(value)  # of a subclass, such as an Enum's
+        return str.__str__(value)  # a plain text of a subclass, such as an Enum's
     if isinstance(value, os.PathLike):
         return os.fsdecode(value)
     if isinstance(value, Integral):

@@ -7,7 +7,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Parameter
 
 DEFAULT_CHARACTER = "humanoid"
-PLANE, NO_GROUND = "plane", "none"  # of a simulator's `terrain`; else it is a URDF's path
+PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any other is a URDF's path
 
 CHARACTER = Parameter(
     "character",

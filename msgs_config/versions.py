@@ -14,7 +14,7 @@ def installed_versions() -> dict[str, str]:
     for package in _PACKAGES:
         try:
             versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:  # a ROS install has some of them from elsewhere
+        except metadata.PackageNotFoundError:  # a ROS install has some from elsewhere
             versions[package] = _UNKNOWN
     versions["libc"] = " ".join(filter(None, platform.libc_ver())) or _UNKNOWN
     return versions

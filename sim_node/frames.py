@@ -22,7 +22,7 @@ class FrameNames:
     """Names of the frames above a character's links, without the character's prefix."""
 
     odom: str
-    base: str  # as the parameter gives it
+    base: str  # the value of the parameter `base_frame`
 
     @classmethod
     def of(cls, values: Values) -> "FrameNames":

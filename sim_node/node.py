@@ -35,7 +35,7 @@ from sim_node.timing.run_control import RunControl
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
-_STOP_FLUSH_TIME = 0.5  # s, after a signal or an error
+_STOP_FLUSH_TIME = 0.5  # s that subscribers may take after a signal or an error
 _MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
 
 
@@ -147,7 +147,8 @@ class SimNode(ComposableNode):
         if states:
             self._simulation.begin_in(states)
         self._given.begin_in(states)
-        if not self._settings.session:  # else a run has said so
+        # A run, which gives its simulator the session, has shown the warnings itself.
+        if not self._settings.session:
             log_warnings(self.node, self._given.in_force)
         self._publisher.publish_configurations(self._given.in_force)
         count = self._settings.wait_for_subscribers
@@ -168,7 +169,7 @@ class SimNode(ComposableNode):
         elif self._flow_control.holds(self._simulation.tick, time.monotonic()):
             executor.serve()
         else:
-            self._advance()  # before the clock: a command that came in time is no timeout
+            self._advance()  # before the watchdog: a command that came in time is no timeout
         self._run_watchdog()
         return idle_seconds
 
@@ -233,7 +234,7 @@ class SimNode(ComposableNode):
                 self._publisher.republish(with_states=waits, with_episode=self._others.seen)
             elif waits and event is WatchdogEvent.EXPLAIN:
                 self.node.get_logger().warning(self._describe_waiting())
-            elif waits and self._simulation.tick > FIRST_TICK:  # before that it just waits
+            elif waits and self._simulation.tick > FIRST_TICK:  # the first tick just waits
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:

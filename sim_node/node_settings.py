@@ -25,7 +25,7 @@ class NodeSettings:
     command_timeout_ns: int  # of simulated time
     push_ticks: int  # that a push lasts
     step_ticks: int  # of a call of `~/step`
-    display_ticks: int  # from what viewers show to the next
+    display_ticks: int  # between two messages for viewers
     frames: FrameNames
     clock: TickClock
     sensing: SensingSettings

@@ -22,7 +22,7 @@ from sim_node.initial_state import (
 )
 from sim_node.world_parameters import WORLD_PARAMETERS
 
-_NEEDED_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the others depend on them
+_NEEDED_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the other parameters depend on these
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 CHARACTERS = Parameter(

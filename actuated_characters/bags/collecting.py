@@ -24,7 +24,7 @@ def collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline
     """Collect the messages of each namespace, on topics that have the contract's names."""
     characters: dict[str, CharacterTimeline] = {}
     worlds: dict[str, WorldTimeline] = {}
-    # by topic, its namespace's timeline and its name there
+    # by topic: the timeline of its namespace, and the topic's name in that
     places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
     for message in read_messages(bag):
         topic = message.topic

@@ -42,9 +42,9 @@ def find_writer(files: Collection[Path]) -> int | None:
     wanted = {(status.st_dev, status.st_ino) for status in map(os.stat, files)}
     for process in Path("/proc").iterdir():
         if process.name.isdecimal():
-            with suppress(OSError):  # it has ended, or is another user's
+            with suppress(OSError):  # the process has ended, or is another user's
                 for descriptor in (process / "fd").iterdir():
-                    with suppress(OSError):  # it was closed meanwhile
+                    with suppress(OSError):  # the file was closed meanwhile
                         status = descriptor.stat()
                         if (status.st_dev, status.st_ino) in wanted and _is_writable(descriptor):
                             return int(process.name)

@@ -18,7 +18,7 @@ from msgs_config.messages.topic import Quality
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
-_STATIC_SETS = 64  # of static frames, one of each character
+_STATIC_SETS = 64  # most sets of static frames that are kept, one of each character
 
 
 class LastPartsWriter:
@@ -31,7 +31,7 @@ class LastPartsWriter:
         self._custom_data: dict[str, str] = {}
         self._topics: dict[str, tuple[str, Quality | QoSProfile]] = {}
         self._latched: dict[str, deque[tuple[bytes, int | None]]] = {}
-        self._size = 0  # of the messages in the newer file
+        self._size = 0  # bytes of the messages in the newer file
         self._bag = BagWriter(path, **options)
 
     def set_custom_data(self, name: str, text: str) -> None:

@@ -38,7 +38,7 @@ def between(
     for each in settings:
         since_ns = -1 if each.after_stamp_ns is None else each.after_stamp_ns
         if since_ns < first_ns:
-            found = []  # the one before has ended
+            found = []  # those before were replaced before the first of these states
         if since_ns < last_ns:
             found.append(each)
     return tuple(found)

@@ -15,11 +15,11 @@ from msgs_config.messages import topics, typed
 class PlanArrays:
     """The expectations of a plan, at each of its c checks."""
 
-    stamp_ns: int  # of the state that it was made in
-    times: FloatArray  # (c,) s after that
-    centres: FloatArray  # (c, 3) m, of mass, in the world
-    costs: FloatArray  # (c,) whose sum is the plan's
-    alternatives: FloatArray  # (c,) of the best of the others
+    stamp_ns: int  # stamp of the state in which the plan was made
+    times: FloatArray  # (c,) s after that state
+    centres: FloatArray  # (c, 3) m, centres of mass in the world
+    costs: FloatArray  # (c,) parts of the plan's cost, which is their sum
+    alternatives: FloatArray  # (c,) parts of the cost of the best other plan that was tried
 
 
 def decode_plan(raw: bytes) -> PlanArrays:

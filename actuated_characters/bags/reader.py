@@ -21,7 +21,7 @@ class RecordedMessage(NamedTuple):
     topic: str
     log_time_ns: int
     raw: bytes
-    type_name: str  # as "sensor_msgs/msg/JointState"
+    type_name: str  # such as "sensor_msgs/msg/JointState"
     published_ns: int | None = None  # wall time; None where nothing says it
 
     @property
@@ -112,7 +112,7 @@ def _messages(
     for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
         log_time_ns, published_ns, _, topic, stored, _ = message
         packed = bag.compression_mode == metadata.MESSAGE
-        if path.is_file():  # no metadata says it
+        if path.is_file():  # no metadata says whether messages are compressed
             packed = stored.startswith(storage.ZSTD_MAGIC)
         try:
             raw = limits.unpack_message(stored, packed=packed)

@@ -26,9 +26,9 @@ class RecordedWorld:
     """The world that a character was in."""
 
     namespace: str = ""  # of its simulator, without the leading slash
-    name: str = ""  # the character's in it, where there were several
-    characters: tuple[str, ...] = ()  # the names of all of them, in the order of their entry
-    terrain: UrdfOptions | None = None  # beside the plane
+    name: str = ""  # the character's name in its world, where there were several
+    characters: tuple[str, ...] = ()  # the names of all characters, in the order of their entry
+    terrain: UrdfOptions | None = None  # what there is beside the plane
 
 
 @dataclass(frozen=True)

@@ -53,38 +53,37 @@ _T = TypeVar("_T")
 class Recording:
     """A character of n degrees of freedom in a bag: t ticks, and the t + 1 states around them.
 
-    Tick k leads from state k to state k + 1. Units and frames: docs/design.md, "Names, states and
-    torques".
+    Tick k leads from state k to state k + 1. Units and frames: docs/topics.md, "Conventions".
     """
 
-    character: Character  # as it stood there, made from the texts in the bag
+    character: Character  # in its place in the world, made from the texts in the bag
     name: str = ""  # its topics' namespace without the leading slash
-    parameters: Mapping[str, Any] = field(repr=False)  # the simulator's, in the first state
-    # the simulator's, one after another; empty where they never changed
+    parameters: Mapping[str, Any] = field(repr=False)  # the simulator's parameters at the start
+    # the simulator's parameters, set after set; empty where they never changed
     simulator: tuple[NodeParameters, ...] = ()
-    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # it ran with them
+    versions: Mapping[str, str] = field(default_factory=dict, repr=False)  # what it was run with
     stamps_ns: IntArray  # (t + 1,): each state once, in order, no tick left out
-    published_ns: IntArray  # (t + 1,): wall time of each state, as the bag has it ...
-    has_wall_times: bool = True  # ... or its log time, if that is simulated and nothing says more
+    published_ns: IntArray  # (t + 1,): when each state was published
+    has_wall_times: bool = True  # False: `published_ns` are simulated log times
     position: FloatArray  # (t + 1, n)
     velocity: FloatArray  # (t + 1, n)
     effort: FloatArray  # (t, n), as really applied in each tick; NaN in one that was a reset
     reference_position: FloatArray  # (t + 1, n), NaN where there was none
     reference_velocity: FloatArray  # (t + 1, n)
-    contacts: Wrenches  # (t,): in each tick, None where no message came; () if never
-    applied_wrench: Wrenches  # likewise: pushes
-    commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): that answer each state, in order
-    controller: tuple[NodeParameters, ...] = ()  # one after another
-    modes: tuple[ModeChange, ...] = ()  # of the controller, one after another
-    plans: tuple[PlanArrays, ...] = ()  # of a planner, one after another
-    unstamped_commands: tuple[CommandArrays, ...] = ()  # that answer no state, in real time
+    contacts: Wrenches  # (t,): those in each tick, None where no message came; () if never
+    applied_wrench: Wrenches  # (t,): pushes in each tick, None where no message came; () if never
+    commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): the answers to each state, in order
+    controller: tuple[NodeParameters, ...] = ()  # the controller's parameters, set after set
+    modes: tuple[ModeChange, ...] = ()  # the controller's changes of mode, in order
+    plans: tuple[PlanArrays, ...] = ()  # the plans of a planner, in order
+    unstamped_commands: tuple[CommandArrays, ...] = ()  # in real time: those that answer no state
     pushes_sent: int = 0  # messages on `external_wrench`
-    # (t,): those that each tick began with; () if there were none
+    # (t,): throws that each tick began with; () if there were none
     throws: tuple[tuple[ProjectileThrow, ...], ...] = ()
-    balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where they are; () if there are none
+    balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where the balls are; () if there are none
     throws_sent: int = 0  # messages on `throw`
-    skipped_states: int = 0  # of an episode whose first state is not in the bag
-    begins_amid: bool = False  # in the middle of an episode, and no other one begins
+    skipped_states: int = 0  # states of an episode whose first state is not in the bag
+    begins_amid: bool = False  # it begins in the middle of an episode, and no other one begins
     world: RecordedWorld = field(default_factory=RecordedWorld)
 
     @property

@@ -24,9 +24,9 @@ from msgs_config.errors import RecordingError
 Progress: TypeAlias = Callable[[str, float | None], None]
 """Gets the stage of a recovery, and the fraction of it that is done, 0 to 1; None if unknown."""
 
-_UNKNOWN_HASH = "INVALID"  # as ROS 2 calls it
-_REPORT_PERIOD = 1000  # messages
-_MOST_NAMED = 3  # files in an error
+_UNKNOWN_HASH = "INVALID"  # what ROS 2 has for a hash that is not known
+_REPORT_PERIOD = 1000  # messages between two reports
+_MOST_NAMED = 3  # files that an error names
 
 
 @dataclass
@@ -35,7 +35,7 @@ class RecoveredContents:
 
     counts: Counter[str] = field(default_factory=Counter)  # messages of each topic
     last_log_time_ns: int = 0
-    unreadable: list[str] = field(default_factory=list)  # parts of each file
+    unreadable: list[str] = field(default_factory=list)  # what could not be read of each file
 
     def add(self, topic: str, log_time_ns: int) -> None:
         """Count a message."""
@@ -76,7 +76,7 @@ def rewrite(damaged: Path, new: Path, progress: Progress) -> RecoveredContents:
             contents.add(topic.name, log_time_ns)
         for topic in (topic for file in files for topic in file.topics.values()):
             if topic.serialization == CDR:
-                _announce(topic, bag, announced)  # without messages, but a reader may ask for it
+                _announce(topic, bag, announced)  # also without messages: a reader may ask for it
     return contents
 
 
@@ -171,6 +171,6 @@ def _compute_hash(topic: StoredTopic) -> str:
 
 
 def _parse_offered(topic: StoredTopic) -> list[Qos]:
-    with suppress(Exception):  # likewise: the messages matter more
+    with suppress(Exception):  # the parser raises anything here, too; the messages matter more
         return parse_qos(topic.offered_qos)
     return []

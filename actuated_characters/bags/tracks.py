@@ -30,9 +30,9 @@ _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 _MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 _PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
-_UNREADABLE_JSON = (ValueError, KeyError, TypeError, RecursionError)  # JSON of another controller
+_UNREADABLE_JSON = (ValueError, KeyError, TypeError, RecursionError)  # raised for foreign JSON
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
-_MOST_NAMED = 3  # gaps
+_MOST_NAMED = 3  # gaps that an error names
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class WorldTimeline:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
         self.has_wall_times = True
-        # by the stamp of the state after the tick
+        # by the stamp of the state after the tick in which they begin
         self.throws: dict[int, tuple[ProjectileThrow, ...]] = {}
         self.balls: dict[int, BallStates] = {}  # by stamp
         self.throws_sent = 0
@@ -118,7 +118,7 @@ class CharacterTimeline:
     def __init__(self, namespace: str) -> None:
         """`namespace` is without the leading slash."""
         self.namespace = namespace
-        self.has_wall_times = True  # else times of publishing are simulated log times
+        self.has_wall_times = True  # False: times of publishing are simulated log times
         self.simulator = SimulatorConfigurations(namespace)
         self.states, self.references = States(), States()
         self.wrenches: dict[str, dict[int, WrenchArrays]] = {  # by topic and stamp
@@ -259,7 +259,7 @@ class CharacterTimeline:
 
     def _take_command(self, raw: bytes, published_ns: int) -> None:
         assert self.rebuilt is not None
-        with suppress(MessageError):  # the simulator did not take it either
+        with suppress(MessageError):  # the simulator did not take an unreadable command either
             sent = self._commands.decode(raw)
             if read_session(sent.frame_id) in (ANONYMOUS, self.rebuilt.known.session):
                 command = CommandArrays(sent.names, sent.effort, published_ns)
@@ -267,7 +267,7 @@ class CharacterTimeline:
 
     def _take_controller(self, raw: bytes, published_ns: int) -> None:
         text = decode_string(raw)
-        if text == self._controller_text:  # latched, it comes to each new listener
+        if text == self._controller_text:  # a latched message comes again to each new listener
             return
         self._controller_text = text
         with suppress(*_UNREADABLE_JSON):
@@ -277,7 +277,7 @@ class CharacterTimeline:
             self.controller.append(NodeParameters(parameters, since_ns))
 
     def _take_plan(self, raw: bytes, published_ns: int) -> None:
-        with suppress(MessageError):  # of another controller
+        with suppress(MessageError):  # raised for a plan of another controller
             plan = decode_plan(raw)
             self.plans[plan.stamp_ns] = plan
 
@@ -285,5 +285,5 @@ class CharacterTimeline:
         with suppress(*_UNREADABLE_JSON):
             facts = dict(json.loads(decode_string(raw)))
             change = ModeChange(int(facts.pop("stamp_ns")), str(facts.pop("mode")), facts)
-            if change not in self.modes[-1:]:  # latched, it comes to each new listener
+            if change not in self.modes[-1:]:  # a latched message comes again to each new listener
                 self.modes.append(change)

@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
 _COMPRESSIONS = {NONE: CompressionType.NONE, ZSTD: CompressionType.ZSTD}
-_VERSION = 9  # of rosbag2's metadata
-_NUMBERS = 1 << 32  # that MCAP has for a topic's messages
+_VERSION = 9  # version of rosbag2's metadata
+_NUMBERS = 1 << 32  # how many numbers MCAP has for a topic's messages
 _T = TypeVar("_T")
 
 
@@ -78,7 +78,7 @@ class BagWriter:
         self._channels: dict[str, int] = {}  # by topic
         self._topics: list[dict[str, object]] = []  # for the metadata
         self._counts = Counter[str]()
-        self._span_ns = (LATEST_NS, 0)  # of the log times
+        self._span_ns = (LATEST_NS, 0)  # first and last log time
         try:
             self._open(_COMPRESSIONS[compression])
         except FileExistsError as error:
@@ -92,13 +92,13 @@ class BagWriter:
     def _open(self, compression: CompressionType) -> None:
         self.path.mkdir(parents=True)
         with ExitStack() as failed:
-            failed.callback(shutil.rmtree, self.path, ignore_errors=True)  # it was not there before
+            failed.callback(shutil.rmtree, self.path, ignore_errors=True)  # the directory is new
             self._file = (self.path / f"{self.path.name}{SUFFIXES[MCAP]}").open("wb")
             failed.callback(_close, self._file)
             self._writer = Writer(self._file, compression=compression)
             self._writer.start("ros2", "actuated_characters")
             self._file.flush()
-            self._lock = DirectoryLock(self.path)  # against a recovery meanwhile
+            self._lock = DirectoryLock(self.path)  # keeps a recovery out meanwhile
             failed.pop_all()
 
     def __enter__(self) -> Self:
@@ -238,7 +238,7 @@ class BagWriter:
                 {"topic_metadata": topic, "message_count": self._counts[str(topic["name"])]}
                 for topic in self._topics
             ],
-            "compression_format": "",  # of the file or of each message
+            "compression_format": "",  # neither the whole file nor each message is compressed
             "compression_mode": "",
             "relative_file_paths": [file],
             "files": [{"path": file, **span}],

@@ -18,10 +18,10 @@ if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.report.comparison.comparison import RecordingComparison
 
 _DIFFERENT = 1  # exit code, like that of diff
-_MOST_SECONDS = 20  # in the table
+_MOST_SECONDS = 20  # seconds that the table has at the most
 _HASH = "state_hash"
 _SHOWN_OF_A_HASH = 12
-_LONGEST_VALUE = 60  # characters
+_LONGEST_VALUE = 60  # characters of a value
 
 
 def add_compare(commands: "Commands[argparse.ArgumentParser]") -> None:

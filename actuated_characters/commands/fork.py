@@ -41,7 +41,7 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
             "fork runs/demo --at 3.2 --set controller_node.gain_scale.p:=0.5 --duration 10",
         ],
     )
-    fork.set_defaults(character=CHARACTER)  # whose parameters a shell completes
+    fork.set_defaults(character=CHARACTER)  # a shell completes this character's parameters
     add_bag(fork)
     at = "time of the last state in common, in s since the first one"
     fork.add_argument("--at", type=float, required=True, metavar="S", help=at)

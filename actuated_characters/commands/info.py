@@ -15,7 +15,7 @@ from actuated_characters.commands.common.tables import make_facts_table, make_ta
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.report.facts import BagFacts, RunFacts, StreamFacts
 
-_MOST_LISTED = 12  # of gaps, pauses, episodes, pushes and changes; --json has all
+_MOST_LISTED = 12  # gaps, pauses, episodes, pushes and changes of each kind; --json has all
 _NS_PER_S = 10**9
 _SIZES = ("B", "kB", "MB", "GB")
 

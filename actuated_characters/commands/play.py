@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # it takes a while to import
 
 _SCENE = "walker"
 _DURATION = 600.0  # s
-_LAST_MEGABYTES = 150.0  # of a scene without --output
+_LAST_MEGABYTES = 150.0  # MB, the least that is kept of a scene without --output
 
 
 def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:

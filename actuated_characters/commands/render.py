@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # they take a second to import
     from actuated_characters.render.engine.camera_pose import Size
 
 _COUNT = 8
-_MAX_PICTURES = 10_000  # pictures
+_MAX_PICTURES = 10_000
 _FPS = 30
 _MOVIE = ".mp4"
 _GHOSTS = ("beside", "over", "none")

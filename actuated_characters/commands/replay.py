@@ -188,7 +188,7 @@ def _print_comparison(
         print(f"largest difference: {comparison.largest}")
     if options.tolerance is not None and comparison.within(options.tolerance):
         print(f"within {options.tolerance:g}: {answers}")
-    elif options.set:  # they are to differ
+    elif options.set:  # with --set the answers are to differ
         print(f"first difference: {first}")
     else:
         raise _difference_error(options.bag, [recording], first)
@@ -275,7 +275,7 @@ def _written_hash(directory: Path) -> str | None:
     try:
         content = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
         return str(content["state_hash"])
-    except (OSError, ValueError, KeyError, TypeError):  # a bag alone, or of another recorder
+    except (OSError, ValueError, KeyError, TypeError):  # a lone bag, or another recorder's files
         return None
 
 

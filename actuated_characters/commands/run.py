@@ -43,7 +43,7 @@ if TYPE_CHECKING:  # it takes a second to import
 
 _DURATION = 10.0  # s
 _NO_PUSH = "none"
-_RECORDING = {  # options, and the recorder's parameters
+_RECORDING = {  # the recorder's parameters by the names of options
     "compression": "compression",
     "log_time": "log_time",
     "topic": "topics",
@@ -147,7 +147,7 @@ class PlannedRun:
     pushes: "Sequence[PlannedPush]"
     throws: "Sequence[PlannedThrow]"
     velocities: "Sequence[PlannedVelocity]"
-    warnings: Sequence[str]  # that the user should read
+    warnings: Sequence[str]  # sentences that the user should read
 
 
 def planned_run(options: argparse.Namespace) -> PlannedRun:

@@ -4,7 +4,7 @@ from controller_node.references.base import Reference, ReferenceState, SampledTo
 from msgs_config.messages.clock import TickClock
 
 _BATCH_TICKS = 64  # ticks that are sampled at once
-_KEPT = 4  # such batches: of the past, of the present, and of what is looked ahead to
+_KEPT = 4  # batches that are kept: of the past, of the present, and of what is looked ahead to
 
 
 class EpisodeMotion:

@@ -47,18 +47,18 @@ if TYPE_CHECKING:
     from actuated_characters.environments.camera import FollowingCamera
 
 _NOTHING: Mapping[str, object] = MappingProxyType({})
-_POSES_IN_VIEW, _TIME_IN_VIEW = 16, 4.0  # of the reference, s, that the camera is far enough for
+_POSES_IN_VIEW, _TIME_IN_VIEW = 16, 4.0  # poses of the reference, s of it, that fit into the view
 
 
 @dataclass(frozen=True)
 class TrackState:
     """All that an environment goes on from; it can be pickled."""
 
-    kind: str  # a hash of the options that must be equal
+    kind: str  # a hash of the options that must be equal in both environments
     simulation: SimulationSnapshot
     start: float  # s of the reference, where the episode began
     random: Mapping[str, Any]  # the generator's state
-    observation: FloatArray  # the last one
+    observation: FloatArray  # the last observation
     ticks_down: int  # steps for which it has been down, see `falls`
 
 
@@ -82,7 +82,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
     after `duration`.
     """
 
-    metadata = {"render_modes": RENDER_MODES, "render_fps": 30}  # noqa: RUF012 - as its base has it
+    metadata = {"render_modes": RENDER_MODES, "render_fps": 30}  # noqa: RUF012 - as in gymnasium
 
     def __init__(
         self,

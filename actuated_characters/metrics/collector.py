@@ -20,7 +20,7 @@ from msgs_config.messages.state import StampedReference
 CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
-COUNTS = {  # the simulator's in its diagnostics, and the figures' names of them
+COUNTS = {  # counts in the simulator's diagnostics, and their names as figures
     "rejected": "rejected_commands",
     "duplicate": "duplicate_commands",
     "rejected_pushes": "rejected_pushes",
@@ -31,8 +31,8 @@ HEARD = frozenset(
 )
 """The topics that the figures are measured from."""
 
-_MOST_EARLY = 20_000  # messages
-_MOST_EARLY_BYTES = 1 << 26  # of them together
+_MOST_EARLY = 20_000  # messages before the configuration
+_MOST_EARLY_BYTES = 1 << 26  # bytes of the messages before the configuration
 
 
 class MetricsCollector:
@@ -47,10 +47,10 @@ class MetricsCollector:
     def __init__(self, simulator: str = topics.SIM_NODE) -> None:
         """`simulator` is the name of its status in the diagnostics."""
         self._simulator = simulator
-        # one each: a decoder is fast for messages of one form, and a reference has no efforts
+        # a decoder for each: it is fast for messages of one form, and a reference has no efforts
         self._states, self._references = JointStateDecoder(), JointStateDecoder()
         self._configuration: RunConfiguration | None = None
-        self._texts: set[str] = set()  # of configurations
+        self._texts: set[str] = set()  # the texts of all configurations so far
         self._early: list[tuple[str, bytes, int | None]] = []
         self._early_bytes = 0
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS.values())
@@ -120,14 +120,14 @@ class MetricsCollector:
         return (last_ns - (self._first_command_ns or last_ns)) / NANOSECONDS_PER_SECOND
 
     def _configure(self, text: str) -> None:
-        if text in self._texts:  # latched, it may come again
+        if text in self._texts:  # a latched configuration may come again
             return
         self._texts.add(text)
         found, known = configuration.parse(text), self._configuration
         if known is not None:
             if found.session == ANONYMOUS or found.session != known.session:
                 raise RecordingError("another simulator, or the same one restarted, was heard")
-            self._measurement.change(found.parameters)  # a reset has changed them
+            self._measurement.change(found.parameters)  # a reset has changed the parameters
             return
         self._configuration = found
         self._measurement = Measurement(found, _postures(text))
@@ -158,5 +158,5 @@ def _postures(text: str) -> PostureReader | None:
     try:
         rebuilt = rebuild(text, "")
         return reader_for(rebuilt.character, rebuilt.world.terrain)
-    except ActuatedCharactersError:  # of another maker's simulator: whether it fell is not known
+    except ActuatedCharactersError:  # another maker's simulator: whether it fell is not known
         return None

@@ -81,7 +81,7 @@ class EquationOfMotion:
         position: FloatArray,  # (n,) of the state that the tick begins with, message form
         velocity: FloatArray,  # (n,)
         effort: FloatArray,  # (n,) applied: `effort` of the state that the tick leads to
-        next_velocity: FloatArray,  # (n,) of that state
+        next_velocity: FloatArray,  # (n,) of the state that the tick leads to
         contacts: FloatArray,  # (links, 6) N, N m; world axes, at the centres of mass
         pushes: Sequence[ExternalWrench] = (),
     ) -> MotionResidual:
@@ -91,7 +91,8 @@ class EquationOfMotion:
         acceleration = self._acceleration(position, velocity, next_velocity)
         # the simulator's own passive forces: damping and friction are implicit, limits soft
         passive = self._passive.effort(position, velocity, effort, pushes)
-        reached = position + self._period * next_velocity  # where it counts, of hinges and sliders
+        # The position at the tick's end, of hinges and sliders; of the others it does not count.
+        reached = position + self._period * next_velocity
         return MotionResidual(
             inertial=model.mass_matrix() @ acceleration,
             bias=model.bias_force() - self._damping * velocity - passive,

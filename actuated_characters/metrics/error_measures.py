@@ -21,7 +21,7 @@ AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
 
 _CONVERSION_ERROR = 1e-12  # m or rad: more than what conversions of rotations round
-_LOWEST = 0.5  # of the height of the reference's centre of mass
+_LOWEST = 0.5  # share of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
 
 
@@ -43,7 +43,7 @@ def vector_kinds(layout: JointLayout) -> VectorKinds:
     types = [joint.type for joint in layout.joints for _ in joint.vectors]
     sliding = np.array([each is JointType.PRISMATIC for each in types], dtype=np.bool_)
     of_root = np.array([each is JointType.FLOATING for each in types], dtype=np.bool_)
-    is_first = np.arange(len(types)) == 0  # of the root's, its translation
+    is_first = np.arange(len(types)) == 0  # the first vector of a root is its translation
     units = tuple("m" if each else "rad" for each in sliding | of_root & is_first)
     return VectorKinds(~(sliding | of_root), sliding, units)
 

@@ -61,7 +61,7 @@ class PostureReader:
         centre = float(self._model.centre_of_mass_at(rest)[2])
         try:
             lowest = float(lowest_heights(character, self._model).min(initial=np.inf))
-        except CharacterError:  # of a mesh that is no longer there
+        except CharacterError:  # raised for a mesh that is no longer there
             lowest = math.inf
         return centre - (lowest if math.isfinite(lowest) else character.placement.z)
 
@@ -106,7 +106,7 @@ def fall_row(down: BoolArray, ticks: FloatArray, rate_hz: float) -> int | None:
     `ticks` (r,) are the rows' numbers at a rate of `rate_hz`; a tick that is left out, as between
     two episodes, is a break.
     """
-    follows = np.zeros(len(down), dtype=np.bool_)  # the row before, down as well
+    follows = np.zeros(len(down), dtype=np.bool_)  # the row before was down, too
     follows[1:] = down[1:] & down[:-1] & (np.diff(ticks) == 1)
     starts = np.flatnonzero(down & ~follows)
     ends = np.flatnonzero(down & ~np.append(follows[1:], False))

@@ -31,7 +31,7 @@ class PushSpan:
 class ContactSeries:
     """The links in contact in each of t ticks, and the vertical force on all of them."""
 
-    links: tuple[str, ...]  # (l,) with a contact in any tick, in the character's order
+    links: tuple[str, ...]  # (l,) those with a contact in any tick, in the character's order
     touching: BoolArray  # (t, l)
     vertical_force: FloatArray  # (t,) N, sum over links; NaN in ticks that were not recorded
 

@@ -110,7 +110,7 @@ class Measurement:
         """Without a reader of postures whether the character fell is not known."""
         self._configuration = configuration
         self._postures = postures
-        self._modes: list[tuple[int, str]] = []  # since which stamp, ns
+        self._modes: list[tuple[int, str]] = []  # stamps, ns, and the modes in force since then
         self._before: FloatArray | None = None  # position in the tick before
         self._has_one_weight = True
         self._layout = layout = configuration.layout
@@ -123,7 +123,8 @@ class Measurement:
         self._ticks = 0
         self._kinds = vector_kinds(layout)
         self._sliders = [joint for joint in layout.joints if joint.type is JointType.PRISMATIC]
-        self._followed = np.zeros(len(self._kinds.units), dtype=np.bool_)  # in the tick before
+        # Whether the reference of each vector followed the state in the tick before.
+        self._followed = np.zeros(len(self._kinds.units), dtype=np.bool_)
         self._columns = [*COLUMNS]
         for joint in self._sliders:
             self._columns += slider_columns(joint.name)
@@ -265,7 +266,7 @@ class Measurement:
         errors = distances(self._layout, position, desired)
         begins = np.array([tick.state.effort is None for tick in block], dtype=np.bool_)
         follows = self._follows(position, errors, begins)
-        errors[follows] = np.nan  # of a reference that is the state, no error is known
+        errors[follows] = np.nan  # a reference that is made of the state tells no error
         if self._kinds.rotating.any():
             columns["joint_error_mean_rad"][:] = _rows(np.mean, errors[:, self._kinds.rotating])
             columns["joint_error_max_rad"][:] = _rows(np.max, errors[:, self._kinds.rotating])

@@ -9,7 +9,7 @@ from msgs_config.messages.state import StampedReference, StampedState
 
 _LONGEST_WAIT = 1000  # ticks that a reference may come after its state
 MOST_AHEAD = 10_000  # ticks that it may come before its state; a publisher keeps half as many
-_MOST_WAITING = _LONGEST_WAIT + MOST_AHEAD  # references
+_MOST_WAITING = _LONGEST_WAIT + MOST_AHEAD  # references that wait for their ticks
 
 
 class TickAssembler:

@@ -16,7 +16,7 @@ _PLANNING = {
     "planner": PREDICTIVE,
     "plan.knots": 0.2,  # s
     "plan.samples": 48,
-    "plan.rounds": 1,  # other worlds look further
+    "plan.rounds": 1,  # the search's other worlds look further
 }
 
 

@@ -19,9 +19,9 @@ from actuated_characters.reconstruction.world import Branch, Grown
 from msgs_config.errors import ConfigurationError, SimulationError
 
 _RECENT = 4  # windows whose costs count beside what is ahead
-_FURTHEST_BACK = 16  # windows
+_FURTHEST_BACK = 16  # windows that a search goes back at the most
 _PLACES = _FURTHEST_BACK + 1  # windows of which places are kept
-_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # each has its own seeds
+_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # bounds by which each world has seeds of its own
 _LARGEST_SEED = 2**32
 
 
@@ -30,7 +30,7 @@ class SearchSettings:
     """A search's settings: the same ones give the same result on any number of processes."""
 
     worlds: int = 8
-    survivors: int = 2  # of them, after each window
+    survivors: int = 2  # worlds that are kept after each window
     window: float = 0.1  # s
     seed: int = 1
     tries: int = 4  # failures without getting any further, going back further each time
@@ -61,10 +61,10 @@ class SearchSettings:
 class Progress:
     """Where a search is; all that it needs to go on, beside its problem and settings."""
 
-    levels: list[list[Node]]  # of each window's kept nodes
+    levels: list[list[Node]]  # the nodes that were kept of each window
     failures: int = 0  # windows in which all worlds were lost
-    stuck: int = 0  # of these, since the furthest window was reached
-    best: Node | None = None  # of the furthest window that was reached
+    stuck: int = 0  # those failures since the furthest window was reached
+    best: Node | None = None  # the best node of the furthest window that was reached
 
     @property
     def window(self) -> int:
@@ -145,7 +145,7 @@ def _next_level(worlds: Worlds, settings: SearchSettings, progress: Progress) ->
         for parent, seed, grown in zip(owners, seeds, worlds.grow(branches), strict=True)
         if grown is not None
     ]
-    return sorted(nodes, key=_value)[: settings.survivors]  # equal ones stay in their order
+    return sorted(nodes, key=_value)[: settings.survivors]  # equal nodes stay in their order
 
 
 def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:

@@ -12,13 +12,13 @@ class Node:
     """A world at the end of a window, from its parent on."""
 
     parent: "Node | None"  # None: it began in the first state
-    tick: int  # at its end, since the first state
-    seed: int  # of the samples of its plans
-    plans: tuple[tuple[int, Offsets], ...]  # that were made in it, by the tick at which they begin
+    tick: int  # the tick at its end, counted from the first state
+    seed: int  # seed of the samples of its plans
+    plans: tuple[tuple[int, Offsets], ...]  # plans made in it, each with the tick when it begins
     end: FloatArray  # (2 n,) position and velocity
-    cost: float  # of the window
-    ahead: float  # of going on as planned
-    place: Place | None = None  # as long as it is kept
+    cost: float  # mean cost of the states of its window
+    ahead: float  # cost of going on as planned
+    place: Place | None = None  # from where other worlds can go on, as long as that is kept
 
     @property
     def path(self) -> "list[Node]":

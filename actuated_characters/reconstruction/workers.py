@@ -13,7 +13,7 @@ from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.world import Branch, Grown, TrialWorld
 from msgs_config.errors import RunError
 
-_MOST_DEATHS = 5  # of processes in one window, one after another; then something else is wrong
+_MOST_DEATHS = 5  # deaths of processes in one window, after which something else must be wrong
 
 _engine: tuple[Problem, int] | None = None  # what a process makes its world of
 _world: TrialWorld | None = None
@@ -37,7 +37,7 @@ class Workers:
 
     def __exit__(self, kind: object, *_: object) -> None:
         if self._pool is not None:
-            if kind is not None:  # their work is not waited for
+            if kind is not None:  # after an error nobody waits for the processes' work
                 for process in multiprocessing.active_children():
                     process.terminate()
             self._pool.shutdown(cancel_futures=True)
@@ -59,7 +59,7 @@ class Workers:
         for _ in range(_MOST_DEATHS):
             self._pool = self._pool or self._fresh_pool()
             try:
-                with _interrupts_blocked():  # here, where processes begin, and in these forever
+                with _interrupts_blocked():  # here while processes start, and in them for good
                     results = self._pool.map(_grow, branches[done:])
                 for grown in results:
                     done += 1
@@ -90,7 +90,7 @@ def _interrupts_blocked() -> Iterator[None]:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
         signal.signal(signal.SIGINT, handler)
-        if came:  # another thread had not blocked it
+        if came:  # it reached a thread that had not blocked it
             signal.raise_signal(signal.SIGINT)
 
 
@@ -112,5 +112,5 @@ def _grow(branch: Branch) -> Grown | None:
     global _world
     if _world is None:
         assert _engine is not None
-        _world = TrialWorld(*_engine)  # what is wrong with it is the task's error
+        _world = TrialWorld(*_engine)  # an error in this line becomes the task's error
     return _world.grow(branch)

@@ -22,7 +22,7 @@ from sim_node.simulation_factory import make_character_setup, make_simulation_se
 class Place:
     """A state of a world, from which any other world can go on."""
 
-    tick: int  # since the first state
+    tick: int  # ticks since the first state
     snapshot: Snapshot
     planner: PlannerSnapshot
 
@@ -31,8 +31,8 @@ class Place:
 class Branch:
     """What a world is to do: go on from a place, window after window."""
 
-    place: Place | None  # None: the first state
-    seeds: tuple[int, ...]  # of the samples of each window's plans
+    place: Place | None  # None: in the first state
+    seeds: tuple[int, ...]  # seeds of the samples of each window's plans
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class Grown:
     """What has become of a branch, in its last window."""
 
     place: Place
-    plans: tuple[tuple[int, Offsets], ...]  # that were made in it, by the tick at which they begin
+    plans: tuple[tuple[int, Offsets], ...]  # plans made in it, each with the tick when it begins
     end: FloatArray  # (2 n,) position and velocity
-    cost: float  # of the window's states, mean
-    ahead: float  # of going on as planned
+    cost: float  # mean cost of the window's states
+    ahead: float  # cost of going on as planned
 
 
 class TrialWorld:

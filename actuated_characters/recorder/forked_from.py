@@ -20,10 +20,10 @@ FORKED_FROM = Parameter(
 class ForkedFrom:
     """The recording that a run was forked from, and the first state that may differ after it."""
 
-    path: str  # of the original's directory or bag
-    state_hash: str  # of all of the original's states
-    tick: int  # of the last state that both have in common, up to which all are equal
-    time: float  # of that state, s since the first one
+    path: str  # path of the original's directory or bag
+    state_hash: str  # hash of all of the original's states
+    tick: int  # tick of the last state in common, up to which all are equal
+    time: float  # time of that state, s since the first one
 
     def to_json(self) -> str:
         """One line of JSON."""

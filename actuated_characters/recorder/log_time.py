@@ -9,9 +9,9 @@ from actuated_characters.recorder.session_filter import Heard
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
-_STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes of CDR before the first field, and behind a length
+_STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes before CDR's first field, and a sequence's first element
 _STAMPED = {"builtin_interfaces/msg/Time", "std_msgs/msg/Header"}
-_SETTLED_NS = 100_000_000  # in which all of one moment come, also on a busy machine
+_SETTLED_NS = 100_000_000  # ns in which all messages of one moment come, also on a busy machine
 _MOST_PENDING = 1000  # messages before the first state; few topics have any then
 
 
@@ -27,7 +27,7 @@ class SimulatedLogTime:
         self._first_ns: int | None = None
         self._last_ns = 0  # stamp of the newest state
         self._pending: list[Heard] = []
-        self._places: dict[str, int | None] = {}  # of the stamp, by topic
+        self._places: dict[str, int | None] = {}  # where messages have their stamp, by topic
         self._unsettled: list[Heard] = []
 
     def settle(self, batch: list[Heard], begun_ns: int | None) -> list[Heard]:
@@ -91,7 +91,7 @@ class SimulatedLogTime:
                 return 0
             order = "<" if raw[1] & 1 else ">"
             if place == _FIRST_STAMP_AT and raw[_STAMP_AT:_FIRST_STAMP_AT] == bytes(4):
-                return 0  # an empty sequence
+                return 0  # an empty sequence has no stamp
             seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, place)
         except (struct.error, IndexError):  # whatever these bytes are, they are recorded
             return 0

@@ -14,7 +14,7 @@ class LossCount:
     def __init__(self, count_publishers: Callable[[], int]) -> None:
         """`count_publishers` says how many there are; asked only where a number does not follow."""
         self._count_publishers = count_publishers
-        self._last: list[int] = []  # number of each publisher, that used last at the end
+        self._last: list[int] = []  # each publisher's last number, the most recent one at the end
         self.lost_messages = 0
 
     def take(self, number: int | None) -> None:
@@ -22,7 +22,7 @@ class LossCount:
         if number is None:
             return
         last = self._last
-        if last and last[-1] == number - 1:  # mostly
+        if last and last[-1] == number - 1:  # the usual case: nothing is lost
             last[-1] = number
             return
         self._remove_predecessor(number)
@@ -35,9 +35,9 @@ class LossCount:
             last.remove(number - 1)
             return
         if len(last) < max(self._count_publishers(), 1):
-            return  # a publisher that is new
+            return  # the number is of a new publisher
         before = max((known for known in last if known < number), default=None)
-        if before is None:  # one that started over
+        if before is None:  # the number is of a publisher that started over
             last.pop(0)
             return
         last.remove(before)

@@ -81,7 +81,7 @@ class RecorderNode(DdsNode):
     def _drain_rest(self) -> None:
         """Take the messages that were there at the stop, within a reasonable time."""
         deadline = time.monotonic() + _LONGEST_END
-        for _ in range(LISTENING_DEPTH // _AT_ONCE):  # no more was there
+        for _ in range(LISTENING_DEPTH // _AT_ONCE):  # more messages cannot have waited
             if not self._drain(gives_way=False):
                 return
             if time.monotonic() > deadline:

@@ -17,7 +17,7 @@ from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.configuration import parse_world
 
 _DAMAGED, _SCRATCH = ".damaged", ".recovering"
-_REPORT_PERIOD = 1000  # messages
+_REPORT_PERIOD = 1000  # messages between two reports
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Recovered:
     contents: RecoveredContents
     damaged: Path | None  # the original; None where the bag was complete and nothing was done
     measured: list[Path] = field(default_factory=list)  # directories with figures rebuilt
-    unchanged: list[Path] = field(default_factory=list)  # with the recorder's own, of the whole run
+    unchanged: list[Path] = field(default_factory=list)  # those with the recorder's own figures
     unmeasured: str = ""  # why a run's directory got no figures
 
 
@@ -76,10 +76,10 @@ def _recover_bag(bag: Path, progress: Progress) -> Recovered:
     except BlockingIOError as error:
         raise RecordingError(f"a recorder is still at work on {bag}; end it first") from error
     try:
-        writer = find_writer(storage_files(bag))  # another recorder, which locks nothing
+        writer = find_writer(storage_files(bag))  # another kind of recorder, which locks nothing
         if writer is not None:
             raise RecordingError(f"process {writer} is still writing to {bag}; end it first")
-        shutil.rmtree(scratch, ignore_errors=True)  # of a recovery that was killed
+        shutil.rmtree(scratch, ignore_errors=True)  # left by a recovery that was killed
         contents = rewrite(bag, scratch / bag.name, progress)
         bag.rename(damaged)
         _finish_swap(bag)

@@ -18,8 +18,8 @@ PARAMETERS, LOGS = "parameters", "logs"
 DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
-REPORT = "report"  # what `report` does
-_MOST_NUMBERED = 10_000  # directories of one name
+REPORT = "report"  # what `report` makes of the bag
+_MOST_NUMBERED = 10_000  # directories whose names differ by a number alone
 
 
 def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[str] = ()) -> None:
@@ -44,7 +44,7 @@ def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[
         REPORT,
     )
     results = [directory / name for name in (*names, *characters)]
-    results += [part_of(path) for path in results]  # of a run that was killed
+    results += [part_of(path) for path in results]  # left by a run that was killed
     try:
         present = set(directory.iterdir()) if directory.exists() else set()
         if present - set(results):

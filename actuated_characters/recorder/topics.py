@@ -27,9 +27,9 @@ class RecordedTopic:
     """A topic that the recorder subscribes to."""
 
     topic: Topic  # its name below the recorder's namespace
-    name: str  # in the bag, absolute
-    own_name: str  # below its character
-    character: str | None  # None if it is of all, or of none
+    name: str  # absolute name in the bag
+    own_name: str  # name below its character's namespace
+    character: str | None  # None if the topic is of all characters, or of none
 
 
 def wanted_topics(node: BusNode, values: Values) -> list[RecordedTopic]:
@@ -41,7 +41,7 @@ def wanted_topics(node: BusNode, values: Values) -> list[RecordedTopic]:
     has_bag = values.flag("write_bag")
     characters = values.texts("characters") or ("",)
     found = contract_topics(node, characters, values.texts("exclude"), measured_only=not has_bag)
-    # first: the simulator begins when its states have all their subscribers
+    # The sensors come first: the simulator begins when its states have all their subscribers.
     return (sensor_topics(node, values.texts("sensors")) if has_bag else []) + found
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 
-_PASSES = 3  # means of means: nearly a Gaussian, and no corner
+_PASSES = 3  # times that means are taken of means: nearly a Gaussian, and no corner
 
 
 def smoothed(path: FloatArray, reach: int) -> FloatArray:

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from actuated_characters.render.engine.renderer import Picture
 
-_SHARE = 15  # a caption's height is one part in so many of its picture's ...
-_MIN_PIXELS = 16  # ... but not less than so many pixels
+_SHARE = 15  # a picture is so many times as high as its caption ...
+_MIN_PIXELS = 16  # ... but a caption has at least so many pixels
 _DPI = 72  # so that a point is a pixel
 _WHITE = 255.0
 
@@ -25,7 +25,7 @@ def write_on(picture: Picture, caption: str) -> Picture:
     height, width, _ = picture.shape
     line = _line(caption, width, _line_height(height), 0.02)
     below = slice(len(line) // 4, min(len(line) // 4 + len(line), height))
-    light = line[: below.stop - below.start] / _WHITE  # the text's own smooth edges
+    light = line[: below.stop - below.start] / _WHITE  # keeps the smooth edges of the text
     written = picture.copy()
     written[below] = np.rint(light * picture[below])
     return written

@@ -59,7 +59,7 @@ def draw(
         drawn: deque[Future[Picture]] = deque()
         try:
             for frame in frames:
-                with _interrupts_blocked():  # which a process that is started here inherits
+                with _interrupts_blocked():  # a process that is started here inherits the block
                     drawn.append(pool.submit(_draw_in_process, frame))
                 if len(drawn) >= _FRAMES_AHEAD * workers:
                     yield drawn.popleft().result()

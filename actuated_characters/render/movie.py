@@ -35,11 +35,11 @@ from msgs_config.nearest_rows import nearest_rows
 MOVIE_SIZE = (960, 540)
 
 _YAW, _PITCH = 0.75, 0.22  # rad: from the right side and in front, so that beside is not behind
-_FOLLOWED_S = 0.6  # how much of the root's path before and after counts for the camera's
-_LEAST_BESIDE = 0.5  # of its height: where a character is narrower, its ghost is so far away
+_FOLLOWED_S = 0.6  # s of the root's path before and after that count for the camera's
+_LEAST_BESIDE = 0.5  # share of its height: the ghost of a narrower character is so far beside it
 _MOST_FRAMED = 150  # pictures that decide on the scale
-_ASTRAY = 1.5  # of the character's size: a ghost that is farther away may leave the picture
-_BETWEEN = "   "  # the parts of a caption
+_ASTRAY = 1.5  # in heights of the character: a ghost that is farther away may leave the picture
+_BETWEEN = "   "  # what separates the parts of a caption
 _MOST_PICTURES = 100_000
 _PICTURES_A_WORKER = 15  # fewer are drawn sooner than another process has started
 
@@ -47,8 +47,8 @@ _PICTURES_A_WORKER = 15  # fewer are drawn sooner than another process has start
 class GhostPlace(Enum):
     """Where a movie has the reference."""
 
-    BESIDE = "beside"  # so that both are seen whole
-    OVER = "over"  # where it really is
+    BESIDE = "beside"  # beside the character, so that both are seen whole
+    OVER = "over"  # in the place where the reference really is
     NONE = "none"
 
 
@@ -57,7 +57,7 @@ class MovieSettings:
     """How a movie is made."""
 
     fps: int = 30  # pictures for each second of the movie
-    speed: float = 1.0  # simulated seconds for each of the movie
+    speed: float = 1.0  # simulated seconds for each second of the movie
     start: float = 0.0  # s since the first state
     end: float | None = None  # s; None: to the last state
     size: Size = MOVIE_SIZE

@@ -15,8 +15,8 @@ from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
-_RADIUS = 0.1  # m, of a ball of which it was not recorded
-_SHORTEST = 0.25  # of the longest arrow: the shortest one
+_RADIUS = 0.1  # m, of a ball whose radius was not recorded
+_SHORTEST = 0.25  # length of the shortest arrow, as a share of the longest one's
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
     *("reference_position", "reference_velocity", "balls", "commands"),
@@ -31,7 +31,7 @@ class Scene:
     Arrays have those of one character after those of another, and so it is with the links (l).
     """
 
-    recordings: tuple[Recording, ...]  # of the same ticks
+    recordings: tuple[Recording, ...]  # recordings of the same ticks
 
     @property
     def characters(self) -> tuple[Character, ...]:

@@ -29,10 +29,10 @@ from msgs_config.nearest_rows import nearest_rows
 from msgs_config.whole_files import write_whole
 from sim_node.physics.world import WorldSettings
 
-LONGEST_ARROW = 0.4  # of the extent of the characters
+LONGEST_ARROW = 0.4  # share of the extent of the characters
 
 _SMALLEST, _LARGEST = 16, 4096  # pixels along an edge of a picture
-_MOST_PIXELS = 2**26  # of a strip
+_MOST_PIXELS = 2**26  # pixels of a whole strip
 _TILE_HEIGHT = 400  # pixels, by default
 _NARROWEST, _WIDEST = 0.5, 1.6  # width over height, by default
 _COLUMNS = 8  # at the most, by default

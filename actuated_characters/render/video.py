@@ -19,7 +19,7 @@ FASTEST = 240  # frames a second
 
 _ENCODER = "libx264"
 _QUALITY = {"crf": "20", "preset": "medium"}  # edges and tiles without visible blocks
-_KEY_FRAME_S = 1.0  # where a player can jump to
+_KEY_FRAME_S = 1.0  # s between frames that a player can jump to
 _BT_709 = 1  # as H.264 numbers the colour space that players take for granted
 _LIMITED_RANGE = 1
 
@@ -84,7 +84,7 @@ def _add_stream(video: "OutputContainer", size: Size, fps: int) -> "VideoStream"
     stream.width, stream.height = size
     stream.pix_fmt = "yuv420p"
     context = stream.codec_context
-    context.thread_count = 1  # what several write depends on how many there are
+    context.thread_count = 1  # what several threads write depends on their number
     context.colorspace = context.color_primaries = context.color_trc = _BT_709
     context.color_range = _LIMITED_RANGE
     return stream

@@ -11,7 +11,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
-_MOST_SHOWN = 3  # numbers of a list
+_MOST_SHOWN = 3  # numbers of a list that are shown
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def live_changes(recording: Recording) -> list[Change]:
 def _changes(settings: Sequence[NodeParameters], start: int) -> list[Change]:
     changes: list[Change] = []
     for earlier, later in pairwise(settings):
-        # None: another controller, or the same one restarted
+        # Without a stamp it is another controller, or the same one restarted.
         after = start if later.after_stamp_ns is None else later.after_stamp_ns
         for name, values in differences(earlier.parameters, later.parameters).items():
             changes.append(Change((after - start) / NANOSECONDS_PER_SECOND, name, *values))

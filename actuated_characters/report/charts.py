@@ -26,9 +26,9 @@ _ROW = 0.24  # inches of a row of a heat map
 _COLUMNS = 3  # panels in a row
 _HEIGHT, _HEIGHT_ALONE = 1.45, 2.2  # inches of a panel among others in a row, and alone in it
 _DPI = 110
-_CELLS = 700  # of a heat map, along the time
-_POINTS = 4000  # of a path
-_BINS = 60  # of a histogram
+_CELLS = 700  # cells of a heat map along the time
+_POINTS = 4000  # points of a path
+_BINS = 60  # bins of a histogram
 _REFERENCE: dict[str, Any] = {"color": "black", "linestyle": "--", "linewidth": 1.0, "alpha": 0.8}
 _PUSH = "tab:orange"
 _MODES = {
@@ -39,8 +39,8 @@ _MODES = {
     "LIMP": "tab:brown",
 }
 _OTHER_MODES = ("tab:pink", "tab:cyan", "tab:olive", "tab:gray", "tab:purple", "gold")
-_BAND = 0.04  # of a panel's height, that the modes take up at its top ...
-_BAND_ABOVE = 0.02  # ... and above it, where colours have a meaning
+_BAND = 0.04  # share of a panel's height that the modes take up at its top ...
+_BAND_ABOVE = 0.02  # ... and above the panel, if its colours have a meaning
 _MOMENTS: dict[str, dict[str, Any]] = {
     "ball let go": {"color": "tab:red", "linestyle": "--"},
     "reset": {"color": "black", "linestyle": "-"},
@@ -55,7 +55,7 @@ class Marks:
 
     pushes: Sequence[tuple[float, float]] = ()  # start and duration
     resets: Sequence[float] = ()
-    changes: Sequence[float] = ()  # of parameters
+    changes: Sequence[float] = ()  # changes of parameters
     pauses: Sequence[float] = ()
     throws: Sequence[float] = ()
     modes: Sequence[tuple[float, float, str]] = ()  # start, duration and name
@@ -113,7 +113,7 @@ class Panel:
     unit: str  # with the quantity: the label of the y axis
     lines: Mapping[str, FloatArray]  # (t + 1,) or (t,) by name; NaN where nothing is known
     title: str = ""
-    from_zero: bool = False  # of an error, which is never negative
+    from_zero: bool = False  # for an error, which is never negative
     is_logarithmic: bool = False
 
     def known(self) -> "Panel":

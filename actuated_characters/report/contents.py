@@ -24,7 +24,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 _STATES = topics.JOINT_STATES.name
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
 _STATE_TYPE, _TEXT_TYPE = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
-_HEADER_BYTES = 12  # of a message up to the end of its stamp
+_HEADER_BYTES = 12  # bytes of a message up to the end of its stamp
 
 
 @dataclass
@@ -37,7 +37,7 @@ class TopicContents:
     first_ns: int = 0  # when it was published, by the wall clock
     last_ns: int = 0
     largest_gap_ns: int = 0  # between two messages that follow each other
-    has_wall_times: bool = True  # else times are simulated log times
+    has_wall_times: bool = True  # False: times are simulated log times
 
     def add(self, message: RecordedMessage) -> None:
         """Count a message, later than all before."""
@@ -72,7 +72,7 @@ class StateMessages:
 
     stamps_ns: "array[int]" = field(default_factory=lambda: array("q"))
     published_ns: "array[int]" = field(default_factory=lambda: array("q"))
-    has_wall_times: bool = True  # else times of publishing are simulated log times
+    has_wall_times: bool = True  # False: times of publishing are simulated log times
     configuration: str = ""  # JSON, the first that there was; empty if there was none
     has_topic: bool = False  # whether there is a topic of states
 
@@ -100,7 +100,7 @@ class Contents:
     files: dict[str, int]  # bytes of each
     storage: str
     compression: str
-    version: int | None  # of metadata.yaml
+    version: int | None  # that of metadata.yaml
     ros_distro: str
     topics: tuple[TopicContents, ...]  # by name
     states: dict[str, StateMessages]  # by namespace
@@ -136,7 +136,7 @@ def read_contents(path: Path) -> Contents:
     found: dict[str, TopicContents] = {}
     states: dict[str, StateMessages] = {}
     readers: dict[str, Callable[[RecordedMessage], None] | None] = {}  # by topic
-    for message in read_messages(bag):  # which raises where the bag is none
+    for message in read_messages(bag):  # raises an error where the bag is none
         name = message.topic
         if name not in found:
             found[name] = TopicContents(name, message.type_name)
@@ -179,7 +179,7 @@ def _reader(
 
 
 def _metadata(bag: Path) -> dict[str, Any]:
-    if bag.is_file():  # without the rest of its directory
+    if bag.is_file():  # a file without the rest of its directory
         storages = {suffix: storage for storage, suffix in SUFFIXES.items()}
         return {"storage_identifier": storages.get(bag.suffix, "unknown")}
     try:

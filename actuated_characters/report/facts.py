@@ -51,14 +51,14 @@ class StreamFacts:
     mode: str | None
     versions: dict[str, str]
     states: int  # messages
-    repeated: int | None = None  # of these, states that had come before
+    repeated: int | None = None  # messages whose state had come before
     ticks: int | None = None  # from the first state to the last, those that are missing included
     sim_time: float | None = None  # s
     missing: list[tuple[int, int]] = field(default_factory=list)  # first and last tick of each gap
     missing_count: int | None = None
     tick_us: dict[str, float] = field(default_factory=dict)  # wall time from state to state
     pauses: list[Span] = field(default_factory=list)  # start in simulated, duration in wall time
-    late: dict[str, float] = field(default_factory=dict)  # of a run that the wall clock paces
+    late: dict[str, float] = field(default_factory=dict)  # lateness where the wall clock paces
 
 
 @dataclass(frozen=True)
@@ -66,18 +66,18 @@ class RunFacts:
     """The facts of a complete recording of one character."""
 
     name: str
-    reference: bool  # whether there is any
+    reference: bool  # whether there is a reference
     contacts: bool
     episodes: list[Span]
     resets: int
     law: str | None
-    gains: list[GainsInForce]  # as they were first
+    gains: list[GainsInForce]  # those in force at the start
     changes: list[Change]
     pushes: list[PushSpan]
     pushes_recorded: bool
     throws: list[ThrowMark]
     modes: list[ModeSpan]
-    saturated_shares: dict[str, float]  # by joint, of its ticks; those with a limit
+    saturated_shares: dict[str, float]  # by joint with a limit, of its ticks
 
 
 @dataclass(frozen=True)

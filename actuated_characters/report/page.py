@@ -54,7 +54,7 @@ class Table:
 class Illustration:
     """A picture."""
 
-    name: str  # of the file, without suffix
+    name: str  # name of the file, without suffix
     png: bytes
     text: str  # the caption, which describes the picture to a reader who does not see it
 

@@ -20,7 +20,7 @@ class ModeSpan:
     mode: str
     start: float  # s since the first state
     duration: float  # s
-    facts: Mapping[str, Any]  # that led to it
+    facts: Mapping[str, Any]  # what led to the mode
 
     @property
     def label(self) -> str:

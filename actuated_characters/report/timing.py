@@ -7,10 +7,10 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
-_PAUSE_FACTOR = 10.0  # of the usual time between two states ...
-_LEAST_PAUSE = 0.1  # s ... and at least so long
-_MIN_REPETITIONS = 8  # times that a state takes long, and ...
-_SHARE = 0.01  # ... this share of all: that is usual then, as with a planner every few states
+_PAUSE_FACTOR = 10.0  # in usual times between two states: a pause is longer ...
+_LEAST_PAUSE = 0.1  # s: ... and longer than this
+_MIN_REPETITIONS = 8  # a state that takes long so often is usual ...
+_SHARE = 0.01  # ... if it has this share of all, as with a planner every few states
 _LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its schedule starts over
 
 
@@ -18,7 +18,7 @@ _LONGEST_BACKLOG = 0.1  # s that the simulator catches up with; beyond it its sc
 class StateTimes:
     """The states of one stream, each once, in order."""
 
-    ticks: IntArray  # (m,) their numbers
+    ticks: IntArray  # (m,) numbers of the states' ticks
     published_ns: IntArray  # (m,) wall time
     repeated: int  # messages whose state had come before
 

@@ -24,7 +24,7 @@ from msgs_config.whole_files import write_whole
 PAGE = "index.html"
 
 _PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join((*NAMES, POSITIONS))})\.png")
-_UNFIT = re.compile("[^A-Za-z0-9_]+")  # for the name of a file
+_UNFIT = re.compile("[^A-Za-z0-9_]+")  # what the name of a file must not have
 
 Progress = Callable[[int, int], None]
 """Is told the number of sections that are made, and that of all."""

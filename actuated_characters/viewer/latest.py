@@ -20,7 +20,7 @@ from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topic import Quality, Topic
 from msgs_config.messages.wrenches import decode_wrenches
 
-_THROWS = 100  # that may come between two looks: as many as an episode can have
+_THROWS = 100  # throws between two looks: as many as an episode can have
 _UNUSABLE_MESSAGE = (MessageError, LayoutError)
 
 
@@ -66,7 +66,7 @@ class CharacterReader:
         """Subscribe to the topics below a namespace, which begins with `/` or is empty."""
         self.sample = CharacterSample()
         self._layout = layout
-        # one each: a decoder is fast for messages of one form, and a reference has no efforts
+        # a decoder for each: it is fast for messages of one form, and a reference has no efforts
         self._state_decoder, self._reference_decoder = JointStateDecoder(), JointStateDecoder()
 
         def newest(topic: Topic) -> _Newest:
@@ -92,7 +92,7 @@ class CharacterReader:
                 return False
             sample.state = state_in_layout(self._layout, self._state_decoder.decode(raw))
         except _UNUSABLE_MESSAGE:
-            return False  # of a node that is not ours; those that use it say so
+            return False  # a message of a node that is not ours; nodes that use it say so
         return True
 
     def close(self) -> None:

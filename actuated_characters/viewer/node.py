@@ -31,9 +31,9 @@ from msgs_config.parameters import resolve
 from msgs_config.runtime.process import StopSignal
 
 _SEARCH_PERIOD = 1.0  # s between looks for simulators
-_FIRST_SEARCH_PERIOD = 0.2  # s, while none is known
+_FIRST_SEARCH_PERIOD = 0.2  # s between looks for simulators, while none is known
 _IDLE_PERIOD = 0.1  # s between looks for clients
-_LEAST_REST = 0.003  # s a picture, for the threads that send it
+_LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
 _LEAF = "character"  # below a namespace's name in the scene, where there may be other namespaces
 
 
@@ -85,7 +85,7 @@ class ViewerNode(Node):
                 is_watched = bool(self._server.get_clients())
                 self._update(is_watched=is_watched, seconds=now - before)
                 before = now
-                executor.serve()  # now that no message waits to be drawn, which it would take first
+                executor.serve()  # when no message waits to be drawn: it would take those first
                 rest = (self._period if is_watched else _IDLE_PERIOD) - (time.monotonic() - now)
                 time.sleep(max(rest, _LEAST_REST))
         finally:

@@ -21,11 +21,11 @@ _CONFIGURATION = "/" + topics.CONFIGURATION.of(topics.SIM_NODE).name
 class Watched:
     """A namespace in which a simulator has published the description of a character."""
 
-    below: str  # begins with `/`, or is empty
+    below: str  # its name, which begins with `/` or is empty
     configuration: DirectSubscription
     episode: DirectSubscription
     rebuilt: Rebuilt | None = None
-    episode_text: str = ""  # the last one's number and session
+    episode_text: str = ""  # the last episode's number and session
     is_new_episode: bool = False  # since the last call of `Simulators.changed`
     reader: CharacterReader | None = None
     readers_session: str = field(default="", repr=False)

@@ -26,7 +26,7 @@ from controller_node.behaviours.state_machine.file import read_machine  # noqa: 
 from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 from msgs_config.geometry import rotations  # noqa: E402
 
-FLIGHT, STANDING = 0.25, 3.0  # s, at least
+FLIGHT, STANDING = 0.25, 3.0  # s, the least of a jump that succeeds
 SEARCHED = (
     "states.crouch.root.height=0.02",
     "states.crouch.root.pitch=0.06",
@@ -44,10 +44,10 @@ SEARCHED = (
 )
 """Where numbers are in the file, and how far a search first moves them."""
 SECONDS = 6.5
-_AIM = 0.3  # s, of flight, of a search
+_AIM = 0.3  # s of flight that a search aims at
 STILL, UPRIGHT = 0.1, 0.98  # m/s of the root; cosine of its tilt
-_FIRST, _LAST = 0.5, 3.1  # s
-_LEAST, _MOST, _LASTS = 10.0, 30.0, 0.2  # N, N, s
+_FIRST, _LAST = 0.5, 3.1  # s, the first and the last time of a push
+_LEAST, _MOST, _LASTS = 10.0, 30.0, 0.2  # N, N, s: least and largest push, and how long it lasts
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Jump:
     push: str  # as of `run --push`
     flight: float  # s, the longest without contact
     rise: float  # m, of the root above where it left the ground
-    standing: float  # s, after it
-    unrest: float  # m, that the root moves over the ground after it
+    standing: float  # s from the flight to the end
+    unrest: float  # m that the root moves over the ground after the flight
     stands: bool  # still and upright at the end
 
     @property

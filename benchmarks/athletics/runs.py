@@ -26,7 +26,7 @@ from controller_node.behaviours.state_machine.description import Machine  # noqa
 from controller_node.behaviours.state_machine.file import read_machine  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError  # noqa: E402
 
-SPEED, AIRBORNE = 2.0, 0.1  # m/s and share of the time, at least
+SPEED, AIRBORNE = 2.0, 0.1  # m/s and share of the time, the least of a run that succeeds
 COMMANDED, TURN = 2.1, 0.3  # m/s, rad/s
 MEASURED = 20.0  # s
 SEARCHED = (
@@ -47,11 +47,11 @@ SEARCHED = (
     "states.flight.targets.stance.knee=0.1",
 )
 """Where numbers are in the file, and how far a search first moves them."""
-_SEARCHED_FOR, _MEASURED_SINCE = 14.0, 4.0  # s, in a search
-_CHANGES = (5.5, 8.0)  # s, when its velocity changes
-_LEAST_SPEED, _RUNS = 1.5, 1.8  # m/s, and from which on there are flights
-_BEGINS = 1.0  # s
-_EVERY, _LEAST, _MOST, _LASTS = 4.0, 10.0, 30.0, 0.2  # s, N, N, s
+_SEARCHED_FOR, _MEASURED_SINCE = 14.0, 4.0  # s, length of a search's trial, start of measurement
+_CHANGES = (5.5, 8.0)  # s, between which the velocity changes
+_LEAST_SPEED, _RUNS = 1.5, 1.8  # m/s, commanded at least, and from which on there are flights
+_BEGINS = 1.0  # s, when the command comes
+_EVERY, _LEAST, _MOST, _LASTS = 4.0, 10.0, 30.0, 0.2  # s, N, N, s: nudges' period, forces, length
 
 
 @dataclass(frozen=True)

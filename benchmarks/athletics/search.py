@@ -53,9 +53,9 @@ SEARCHED = (
 )
 """Where numbers are in the file, and how far they are first moved."""
 
-FALL, SPEED, DRIFT, HEADING, EFFORT = 10.0, 4.0, 4.0, 2.0, 0.1  # of the cost's parts
-SECONDS = 9.0  # of a trial
-MOST_SPEED, MOST_ASIDE, MOST_TURN = 1.2, 0.3, 0.5  # m/s, m/s, rad/s, of commands
+FALL, SPEED, DRIFT, HEADING, EFFORT = 10.0, 4.0, 4.0, 2.0, 0.1  # weights of the cost's parts
+SECONDS = 9.0  # s of a trial
+MOST_SPEED, MOST_ASIDE, MOST_TURN = 1.2, 0.3, 0.5  # m/s, m/s, rad/s: the largest commands
 AHEAD, ASIDE = 100.0, 50.0  # N, of pushes
 
 
@@ -138,7 +138,7 @@ class Task:
     """What a machine is to do."""
 
     searched: Sequence[str]
-    draw: Callable[[np.random.Generator, int, int], Sequence[Any]]  # trials: how many, Hz
+    draw: Callable[[np.random.Generator, int, int], Sequence[Any]]  # trials: given their number, Hz
     cost: Callable[[Machine, Sequence[Any]], float]
 
 

@@ -32,7 +32,7 @@ KINDS = ("speeds", "headings", "pushes", "steps", "grid", "slalom", "bends")
 SPEEDS = (0.3, 0.6, 0.9, 1.2)  # m/s
 AHEAD, ASIDE = 120.0, 60.0  # N, of pushes
 STEP = 0.03  # m, of the ground up or down
-TURN = 0.5  # rad/s, to a heading
+TURN = 0.5  # rad/s while it turns to a heading
 GRID = ((0.0, 0.3, 0.6, 0.9, 1.2), (-0.5, -0.25, 0.0, 0.25, 0.5), (-0.3, 0.0, 0.3))
 """Speeds ahead, m/s, turn rates, rad/s, and velocities to the left, m/s."""
 GRID_SECONDS = 15.0

@@ -88,7 +88,7 @@ def draw_strip(clip: str, run: Recording) -> Picture:
 
 def draw_movie(run: Recording, size: tuple[int, int]) -> list[Picture]:
     """All of a run, its reference where it really is."""
-    end = float(run.times[-2])  # of the last state nothing answers
+    end = float(run.times[-2])  # nothing answers the last state
     settings = MovieSettings(fps=FRAMES_A_SECOND, end=end, size=size, ghost=GhostPlace.OVER)
     return list(Movie([run], settings).pictures())
 

@@ -11,7 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from msgs_config.arrays import BoolArray, FloatArray
 
 STEPS = 30  # of Newton's method
-RIDGE = 0.01  # or few walks leave the fit without a minimum
+RIDGE = 0.01  # without it few walks leave the fit without a minimum
 
 
 def draw(impulses: Sequence[tuple[float, float]], borne: Sequence[bool], file: Path) -> None:

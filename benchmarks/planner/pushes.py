@@ -44,7 +44,7 @@ from msgs_config.messages.state import StampedReference, StampedState  # noqa: E
 LINK = "root"
 BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
 BALL_LIFETIME = 0.6  # s, of which it flies 0.2
-MISSED = 0.2  # m, of the walk beside its clip
+MISSED = 0.2  # m that a walk is beside its clip where a ball misses it
 EVERY = 0.1  # s, from one look to the next
 COLUMNS = ("kind", "upright", "fell at, s", "error 0, 1, 2, 3 s after, m", "away, m", "missed")
 NODES = ("sim_node", "controller_node")
@@ -59,7 +59,7 @@ class WalkResult:
     upright: bool  # at the end, and tracking its own clip
     errors: tuple[float, ...]  # m, of the centre of mass, from where the clip has given way to
     away: float  # m, of the clip's centre of mass from its own place, at the end
-    missed: int  # balls
+    missed: int  # balls that missed
 
 
 # A walk

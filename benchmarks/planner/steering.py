@@ -43,7 +43,7 @@ from msgs_config.errors import ActuatedCharactersError, SimulationError  # noqa:
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
 EIGHT_ENDS, EIGHT_LASTS = 50.4, 60.0  # s
 DRIVEN, STOP_LASTS = 5.0, 10.0  # s
-STANDS, OVER = 0.15, 0.25  # m/s, mean over s
+STANDS, OVER = 0.15, 0.25  # m/s, s: it stands if it is slower than this in the mean over that time
 COLUMNS = ("seed", "fell at, s", "path error, m", "mean", "beside, m", "stop, s", "wall s per s")
 
 
@@ -63,7 +63,7 @@ class DriveResult:
     fell_at: float | None  # s
     largest: float  # m, of the path error
     mean: float  # m
-    beside: float  # m, the largest
+    beside: float  # m, the largest distance of the root from the path
     stopped: float  # s after timeout or command; infinite if it has not
     wall: float  # s a simulated second
 

@@ -15,11 +15,11 @@ class Kind:
 
     forwards: float = 0.0  # N s
     sideways: float | None = None  # N s; None: as hard from any side
-    hardest: float | None = None  # N s, likewise; None: all are as hard
+    hardest: float | None = None  # N s, up to which pushes differ; None: all are as hard
     pushes: int = 1
     every: float = 2.0  # s
-    lasts: float = 0.2  # s, of each
-    balls: bool = False  # at the chest; the clip's heading is forwards
+    lasts: float = 0.2  # s that each push lasts
+    balls: bool = False  # balls at the chest; the clip's heading is forwards
     stands: bool = False  # instead of walking
     duration: float = 8.5  # s
     behaviour: str = "tracking"

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 _LENGTH, _MASS = 0.1, 0.1  # m and kg of a link
-_AXES = ("1 0 0", "0 1 0")  # in turn, so that the chain moves in three dimensions
+_AXES = ("1 0 0", "0 1 0")  # axes of the hinges in turn, so that it moves in three dimensions
 
 
 def write_chain(directory: Path, hinges: int) -> Path:

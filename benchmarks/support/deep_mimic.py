@@ -20,7 +20,7 @@ from msgs_config.geometry import rotations
 
 _DATA = Path(pybullet_data.getDataPath())
 _LARGEST_EFFORTS = [0.0] * 7 + [1e3] * 36  # a floating base, then ball joints as quaternions
-_UPRIGHT_BACK = rotations.conjugate(rotations.ABOUT_X_QUARTER_TURN_XYZW)  # their world is y-up
+_UPRIGHT_BACK = rotations.conjugate(rotations.ABOUT_X_QUARTER_TURN_XYZW)  # DeepMimic is y-up
 
 
 def _deep_mimic(name: str) -> ModuleType:
@@ -41,7 +41,7 @@ class DeepMimicStablePd:
         self._client.setAdditionalSearchPath(str(_DATA))
         motion = _deep_mimic("motion_capture_data").MotionCaptureData()
         motion.Load(str(_DATA / "data/motions/humanoid3d_walk.txt"))
-        with captured_output():  # it says a lot
+        with captured_output():  # DeepMimic prints a lot
             self._law = _deep_mimic("humanoid_stable_pd").HumanoidStablePD(
                 self._client, motion, 1.0 / 240.0, useFixedBase=False
             )

@@ -47,7 +47,7 @@ class RatioComparison:
     @property
     def is_worse(self) -> bool:
         """Whether it is worse by more than what measurements scatter by."""
-        return self.change is not None and not self.change <= TOLERANCE  # NaN is worse, too
+        return self.change is not None and not self.change <= TOLERANCE  # NaN counts as worse, too
 
 
 def compare(measured: Iterable[Ratio], stored: Mapping[str, float]) -> list[RatioComparison]:

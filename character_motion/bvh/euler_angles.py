@@ -10,7 +10,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_LOCKED = 1e-5  # cos b below which a is free; holding it turns what moves by less than that, rad
+_LOCKED = 1e-5  # cos b below which a is free; to hold it then errs by less than that, rad
 _FULL = 2.0 * np.pi
 
 

@@ -23,7 +23,7 @@ MAX_BYTES = 64 * 1024 * 1024
 """Of a file: ten minutes of a body with fingers at 120 Hz."""
 _FRAMES = "Frames:"
 _FRAME_TIME = "Frame Time:"
-_LONGEST_FRAME_TIME = 10.0  # s; one of more is in other units
+_LONGEST_FRAME_TIME = 10.0  # s; a longer one is in other units
 
 
 def read_bvh(path: Path) -> BvhMotion:
@@ -99,7 +99,7 @@ def _values(path: Path, rows: Sequence[tuple[int, str]], width: int) -> FloatArr
             values[frame] = words
         except ValueError:
             values[frame] = [parse_number(word) for word in words]
-        if not (np.abs(values[frame]) <= LARGEST).all():  # NaN is not
+        if not (np.abs(values[frame]) <= LARGEST).all():  # NaN is refused, too
             bad = words[int(np.argmin(np.abs(values[frame]) <= LARGEST))]
             raise wrong_line(path, number, bad, f"finite numbers up to {LARGEST:g}, as all are")
     return values

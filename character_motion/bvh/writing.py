@@ -19,7 +19,7 @@ def write_bvh(path: Path, motion: BvhMotion) -> None:
 
 def bvh_text(motion: BvhMotion) -> str:
     """A motion as the text of a BVH file."""
-    values = np.round(motion.values, _DECIMALS) + 0.0  # which has no -0
+    values = np.round(motion.values, _DECIMALS) + 0.0  # the sum has no -0
     row = " ".join([f"%.{_DECIMALS}f"] * values.shape[1])
     lines = [
         "HIERARCHY",

@@ -12,7 +12,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import fixed_order, rotations
 
-_SHORTEST = 0.2  # s of a cycle
+_SHORTEST = 0.2  # s that a cycle lasts at least
 _COMPARED_SECONDS = 0.1  # s over which two moments are compared
 _SPEEDS = (0.05, 20.0)
 _EPSILON = 1e-9  # s
@@ -67,7 +67,7 @@ def loop(clip: MotionClip, start: float | None = None, end: float | None = None)
     )
     layout, moves = clip.character.layout, clip.character.layout.has_floating_base
     begin, finish = _row(part.motion, 0), _row(part.motion, -1)
-    if moves:  # on the ground, and about z, it goes on from where it is
+    if moves:  # over the ground, and about z, a cycle goes on from where it ended
         begin = _turned(begin, _yaw_between(begin, finish))
     gap = layout.difference(finish, begin)
     if moves:

@@ -28,7 +28,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
-_MOST_FRAMES = 30_000  # a file of which is read again
+_MOST_FRAMES = 30_000  # frames of a clip: its file can still be read
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
 _WORDS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l_", "r_"), ("_l", "_r"))
-_MAX_MIRROR_ERROR = 0.01  # m, and of axes
+_MAX_MIRROR_ERROR = 0.01  # m for places; for axes, what their cosine may lack to one
 
 
 def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:

@@ -14,11 +14,11 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import rotations
 
-_AT_LIMIT = 0.03  # rad
+_AT_LIMIT = 0.03  # rad from a limit
 _SHORTEST_SWING = 0.2  # s
-_BLOCK = 256  # frames
+_BLOCK = 256  # frames that are measured at once
 _OVERLAPS, _IN_GROUND, _CLEARANCE = 0.005, 0.01, 0.01  # m beyond which there is a remark
-_SKATING, _STANDING = 0.05, 0.05  # m/s, and of the frames
+_SKATING, _STANDING = 0.05, 0.05  # m/s, and share of the frames, for a remark
 _DIGITS = 4
 
 
@@ -31,11 +31,11 @@ class ClipQuality:
     deepest_link: str
     skating_mean_m_s: float | None  # of the parts of soles that stand; None if none does
     skating_p95_m_s: float | None
-    standing_share: float  # of the time in which a foot stands
+    standing_share: float  # share of the time in which a foot stands
     swing_clearance_m: float | None  # the least of all swings, in their middle; None without one
-    overlap_m: float  # the deepest of two shapes in each other
+    overlap_m: float  # how deep two shapes are in each other at the most
     overlap_pair: str
-    overlap_share: float  # of the frames
+    overlap_share: float  # share of the frames with an overlap that deserves a remark
     limits_touched: dict[str, float]  # by degree of freedom, the share of frames at a limit
     fastest_joint: str
     fastest_joint_rad_s: float

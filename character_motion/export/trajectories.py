@@ -15,7 +15,7 @@ from msgs_config.geometry import rotations
 from msgs_config.nearest_rows import nearest_rows
 
 _MOST_FRAMES = 100_000
-_STEP_ROUNDING = 1e-6  # of a step: the last frame is not lost to it
+_STEP_ROUNDING = 1e-6  # share of a step, so that the last frame is not lost to rounding
 
 Progress = Callable[[int], None]
 """Is told how many frames there are so far."""
@@ -25,7 +25,7 @@ Progress = Callable[[int], None]
 class CharacterTrajectory:
     """The positions of one character at t times; rotations are in the quaternions alone."""
 
-    name: str  # in its world; the character's own where it has none there
+    name: str  # its name in its world; the character's own where it has none there
     character: Character
     configurations: GeneralizedPosition  # (t, n) message form, (t, k, 4)
 

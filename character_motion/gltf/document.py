@@ -37,7 +37,7 @@ class GltfDocument:
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
         self._materials: dict[Quadruple, int] = {}
-        self._names: set[str] = set()  # of nodes
+        self._names: set[str] = set()  # names of all nodes so far
         self._roots: list[int] = []
         self._binary = bytearray()
 

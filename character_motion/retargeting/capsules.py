@@ -17,7 +17,7 @@ from msgs_config.geometry import rotations
 APART, SHANKS_APART = 0.01, 0.08
 """m between two shapes, and from shank and foot to those of the other leg, which sway when tracked;
 less where they are nearer to each other in the pose with all joints at zero."""
-_TINY = 1e-24  # m^2 or m, of what has no length
+_TINY = 1e-24  # m^2 or m; what is smaller has no length
 
 Capsule = tuple[FloatArray, FloatArray, float]
 """Both ends (3,) of its axis in the link frame and its radius, m."""
@@ -28,9 +28,9 @@ class Capsules:
     """The capsules of a character, c of them, and the p pairs that are kept apart."""
 
     links: IntArray  # (c,) indices of `Character.links`
-    ends: FloatArray  # (c, 2, 3) m, of their axes, in the link frame
+    ends: FloatArray  # (c, 2, 3) m, ends of their axes, in the link frame
     radii: FloatArray  # (c,) m
-    pairs: IntArray  # (p, 2) of capsules
+    pairs: IntArray  # (p, 2) two capsules each
     margins: FloatArray  # (p,) m by which they are apart at least
 
     def of_pairs(self, rows: IntArray) -> "Capsules":
@@ -58,7 +58,7 @@ class Capsules:
 class Nearest:
     """Where p pairs of capsules are nearest to each other in f frames."""
 
-    first: FloatArray  # (f, p, 3) m, on the axis of the first one, in the world
+    first: FloatArray  # (f, p, 3) m, the point on the first one's axis, in the world
     second: FloatArray
     direction: FloatArray  # (f, p, 3) from the second one to the first one, of length 1
     distance: FloatArray  # (f, p) m between their surfaces, below 0 where they overlap
@@ -75,7 +75,7 @@ def closest_points(first: FloatArray, second: FloatArray) -> tuple[FloatArray, F
     # Without what lies along the other line, the angle between nearly parallel ones is exact.
     across = way - _share(way, other_way) * other_way
     gap_across = between - _share(between, other_way) * other_way
-    s = np.clip(_share(-gap_across, across), 0.0, 1.0)  # any one on parallel lines
+    s = np.clip(_share(-gap_across, across), 0.0, 1.0)  # on parallel lines any point will do
     t = np.clip(_share(between + s * way, other_way), 0.0, 1.0)
     s = np.clip(_share(t * other_way - between, way), 0.0, 1.0)
     return start + s * way, other_start + t * other_way

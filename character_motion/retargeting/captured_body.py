@@ -10,8 +10,8 @@ from character_motion.retargeting.skeleton_map import SIDES, SkeletonMap, ancest
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_SHORTEST = 0.02  # of a leg's length; a bone shorter than that has no direction
-_BEGINS_NEAR = 0.3  # of the way from the hips to the neck, that its middle may be off
+_SHORTEST = 0.02  # share of a leg's length; a shorter bone has no direction
+_BEGINS_NEAR = 0.3  # share of the way from hips to neck that the spine's middle may be off
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class CapturedBody:
 
     frame_time: float  # s
     names: tuple[str, ...]  # (j,) of the joints
-    parents: tuple[int, ...]  # (n,) of the nodes; -1 of the root
+    parents: tuple[int, ...]  # (n,) index of each node's parent; -1 of the root
     positions: FloatArray  # (f, n, 3)
     orientations_xyzw: FloatArray  # (f, j, 4) of the joints, since the pose of zero rotations
     rest: FloatArray  # (n, 3) the pose of zero rotations, in the file's axes

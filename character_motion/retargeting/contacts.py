@@ -11,8 +11,8 @@ _ENTER, _LEAVE = ((0.022, 0.20), (0.05, 0.10)), ((0.035, 0.40), (0.06, 0.15))
 """Heights in m below which, and speeds in m/s below which a point touches; either pair will do."""
 _SMOOTHED = 0.05  # s over which a speed is measured
 _MIN_CONTACT, _MAX_GAP = 0.06, 0.05  # s of a contact, and of a break that is none
-_STILL_DISTANCE = 0.05  # m from the middle of a contact, that a point may be during it
-_SMOOTHED_PLACES = 0.08  # s over which places are averaged before
+_STILL_DISTANCE = 0.05  # m, the farthest that a point may be from its mean place during a contact
+_SMOOTHED_PLACES = 0.08  # s over which places are averaged, so that noise goes
 _GROUND = 2.0  # per cent of the heights of a joint that may be below its height on the ground
 
 

@@ -17,11 +17,11 @@ from msgs_config.geometry import rotations
 
 _LEG = 0.82  # m from the hip to the ankle of an adult
 _USUAL_UNITS = ("m", "cm", "mm", "inches", "feet")
-_NEAREST = 0.35  # of a natural logarithm: a leg of 0.58 m to 1.16 m
+_NEAREST = 0.35  # difference of natural logarithms: a leg of 0.58 m to 1.16 m
 _PRIOR = {"y": 0.10, "z": 0.05, "x": -0.05, "-x": -0.3, "-y": -0.2, "-z": -0.2}
-_UPRIGHT = math.cos(math.radians(38.0))  # of legs and trunk in a pose of rest
-_JUMP = 0.12  # of a leg's length that joints move between a pose that was put first, and the motion
-_MORE_THAN_ELSE = 6.0  # times as much as elsewhere
+_UPRIGHT = math.cos(math.radians(38.0))  # least cosine of the tilt of legs and trunk at rest
+_JUMP = 0.12  # in lengths of a leg, how far joints move from a pose that was put first
+_MORE_THAN_ELSE = 6.0  # times as far as joints move between other frames
 _FACING_TIME = 0.1  # s over which a body's first heading is measured
 
 
@@ -34,9 +34,9 @@ class Conventions:
     unit_length: float  # m
     heading: float  # rad about up, of the body at first, from the axis that comes after up
     rest: str  # what the pose of zero rotations is
-    first_frame: int  # of the motion; a pose that was put before it is left out
+    first_frame: int  # first frame of the motion; a pose that was put before it is left out
     sides_swapped: bool  # what is called left is right
-    root_moves: bool  # whether the file has where the root is
+    root_moves: bool  # whether the file says where the root is
     is_own: bool = False  # the skeleton is the character's own, and the motion taken as it is
 
     def described(self) -> str:

@@ -18,14 +18,15 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import fixed_order, rotations
 
-_USUAL_FRAME = 1.0 / 60.0  # s, whose residuals count once
-_DAMPING = 1e-2  # added to each block at least: the coordinates that no residual is about
-_STIFFENED, _EASED, _MOST_DAMPING = 8.0, 4.0, 1e6  # times, after a step that failed or did well
+_USUAL_FRAME = 1.0 / 60.0  # s: the residuals of a frame of this duration count once
+_DAMPING = 1e-2  # added to each block at least, for coordinates that no residual is about
+# Factors of the damping after a step that failed and one that did well, and its bound.
+_STIFFENED, _EASED, _MOST_DAMPING = 8.0, 4.0, 1e6
 _FIXED = 1e12  # added where frames are fixed
 _LARGEST_STEP = 0.4  # rad or m
 _LAST_STEP = 3e-4  # rad or m of the largest step, at which an iteration ends
-_ACTIVE_SETS = 5  # solutions of a step, between which bounds come and go
-_WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and of these solved again
+_ACTIVE_SETS = 5  # times that a step is solved while bounds come and go
+_WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and those solved once more
 _NEAR_DISTANCE = (
     0.2  # m between two shapes at first, beyond which a solution does not bring them together
 )
@@ -46,13 +47,13 @@ class Goals:
     links: IntArray  # (k,) whose turns are given
     turns_xyzw: FloatArray  # (f, k, 4), world
     turn_weights: FloatArray  # (f, k, 3, 3) 1/rad, of rotation vectors in world axes
-    point_links: IntArray  # (p,) of points that move with links
+    point_links: IntArray  # (p,) links that the points move with
     point_offsets: FloatArray  # (p, 3) m, in the link frame
     places: FloatArray  # (f, p, 3) m, where the points should be
     place_weights: FloatArray  # (f, p, 3) 1/m
     surface: SurfacePoints
     clearance: FloatArray  # (f, s) m, of each ball of the surface over the ground
-    ground_weight: float  # 1/m below that
+    ground_weight: float  # 1/m below that clearance
     capsules: Capsules
     overlap_weight: float  # 1/m nearer to each other than their margins
     limit_weight: float  # 1/rad beyond a limit
@@ -267,7 +268,7 @@ class _Linearised:
 
     motion: GeneralizedPosition
     wanted: Linear
-    bounded: Linear  # which count only where something is missing
+    bounded: Linear  # residuals that count only where something is missing
     accelerations: FloatArray  # (f - 2, n), per frame
     cost: float
 

@@ -9,7 +9,7 @@ from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import elementary, rotations
 
-_ITERATIONS, _DAMPING, _LARGEST = 30, 1e-3, 0.5  # rad of a step
+_ITERATIONS, _DAMPING, _LARGEST = 30, 1e-3, 0.5  # the last one is in rad, of a step
 
 
 def joint_angles(

@@ -14,7 +14,7 @@ _SIDES = {"left": LEFT, "l": LEFT, "lft": LEFT, "right": RIGHT, "r": RIGHT, "rgt
 _NAMELESS = re.compile(  # words that say whose joint it is, or that it is one
     r"(mixamorig|bip|character|skeleton|skel|rig|armature|def|jnt|jt|j|b|bone|cc|base|bend|c|ctrl)\d*"
 )
-_SIDE_AND_WORD = re.compile(r"([lr])([uf])")  # of `LUArm`, the left upper arm
+_SIDE_AND_WORD = re.compile(r"([lr])([uf])")  # such as `LUArm`, the left upper arm
 _HELPERS = re.compile(
     r"twist|roll|nub|dummy|helper|pole|phys|thumb|index|middle|ring|pinky|little|finger|prop|eye|jaw"
 )

@@ -14,18 +14,18 @@ from character_motion.retargeting.conventions import rest_up
 from character_motion.retargeting.skeleton_map import SIDES
 from msgs_config.arrays import FloatArray
 
-_SHARES = {  # of a leg from hip to ankle
+_SHARES = {  # shares of a leg's length from hip to ankle
     "the shank": (0.40, 0.62),
     "an arm from shoulder to wrist": (0.45, 0.85),
     "the trunk from hips to neck": (0.38, 0.95),
     "the distance of the hips": (0.06, 0.42),
 }
-_MOST_DOUBTS = 1  # that there may be of a human
+_MOST_DOUBTS = 1  # doubts that a human body may give rise to
 _ANIMAL = re.compile(r"(?<!pony)(?<!coat)tail|paw(?!n)|hoof|wing|snout|hind|fetlock", re.IGNORECASE)
 _LIES = 0.5  # cosine of the trunk's angle to the vertical, below which it lies
-_MOSTLY = 0.8  # of the frames
+_MOSTLY = 0.8  # share of the frames
 _FLIGHT, _SMOOTHED = 1.0, 0.2  # s that a jump lasts at most, and over which the ground is smoothed
-_FLOATS = 0.05  # m
+_FLOATS = 0.05  # m over the ground
 
 
 def doubts_of_human(body: CapturedBody) -> tuple[str, ...]:

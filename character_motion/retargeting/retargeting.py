@@ -42,7 +42,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
-_STILL_SHARE = 1e-4  # of a leg's length, by which a root moves that does not move
+_STILL_SHARE = 1e-4  # share of a leg's length; a root that moves less does not move
 _HAND_HEIGHT = 0.05  # m of a wrist over the lowest joint of the feet, while the hand stands
 
 
@@ -50,7 +50,7 @@ _HAND_HEIGHT = 0.05  # m of a wrist over the lowest joint of the feet, while the
 class RetargetingSettings:
     """What is told rather than found out."""
 
-    joints: Mapping[str, str] | None = None  # of the skeleton, by role
+    joints: Mapping[str, str] | None = None  # the skeleton's joints, by role
     up: str | None = None  # an axis
     unit: str | None = None  # a key of `UNITS`
     ground: bool = False  # whether feet that float are put on the ground
@@ -64,7 +64,7 @@ class RetargetedMotion:
     conventions: Conventions
     scale: float  # the character's lengths over the file's, in the file's unit
     contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
-    turns: SegmentTurns  # that were to be shown
+    turns: SegmentTurns  # the turns that were to be shown
     motion: GeneralizedPosition  # (f, n), (f, k, 4)
     remarks: tuple[str, ...] = ()  # on the capture, a sentence each
 

@@ -20,7 +20,7 @@ from msgs_config.geometry import rotations
 _UP, _LEFT, _AHEAD = np.eye(3)[2], np.eye(3)[1], np.eye(3)[0]
 _BENT = (0.15, 0.45)  # sines of the angle of knee or elbow between which its own axis takes over
 _MIN_FRAMES = 5  # frames on the ground that tell how a sole lies
-_TILTED = np.cos(np.radians(50.0))  # of a sole at rest, beyond which it is no sole
+_TILTED = np.cos(np.radians(50.0))  # cosine of a sole's tilt at rest, beyond which it is no sole
 
 Across = Callable[[FloatArray], FloatArray]
 """The axis (f, 3) about which a limb usually bends whose upper bone is (f, 3)."""

@@ -103,7 +103,7 @@ class GivenJoints:
     """What a file says of joints by role: of a captured skeleton, and of a character."""
 
     source: Mapping[str, str]
-    target: Mapping[str, str]  # links, or joints
+    target: Mapping[str, str]  # names of links, or of joints
 
 
 def read_map(path: Path) -> GivenJoints:
@@ -175,7 +175,7 @@ def _with_trunk(found: dict[str, int], parts: Parts, parents: Sequence[int]) -> 
     chest = common_ancestor(arms, parents) if len(arms) == len(SIDES) else pelvis
     if (
         any(part in NECK for _, part in parts[chest]) and parents[chest] >= 0
-    ):  # as where a biped's collars hang
+    ):  # a biped's collars hang on its neck
         chest = parents[chest]
     result = {"pelvis": pelvis, "chest": chest}
     for role, words in (("neck", NECK), ("head", HEAD)):

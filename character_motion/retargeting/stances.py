@@ -20,11 +20,11 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
 _STANDING, _HAND = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
-_BLEND, _BLENDED = 0.06, 0.05  # s before and after it in which a stance takes hold, and how far
+_BLEND, _BLENDED = 0.06, 0.05  # s beside a stance in which it takes hold, and by what share at most
 _FLAT_COSINE = 0.7  # cosine of the tilt of a sole that is put flat on the ground
-_ALONG_GROUND = np.array((1.0, 1.0, 0.0))  # one that is not is held along the ground alone
+_ALONG_GROUND = np.array((1.0, 1.0, 0.0))  # for a sole that is not put flat: along the ground
 _RAISED = 0.02  # m that a foot in the middle of its swing is lifted over the captured one
-_LEAST_LIFT, _USUAL_LIFT, _MOST_LIFT = 0.02, 0.03, 0.08  # m; the second one where it can be
+_LEAST_LIFT, _USUAL_LIFT, _MOST_LIFT = 0.02, 0.03, 0.08  # m; usual where the capture allows it
 _LIFT_SPEED = 0.4  # m/s
 
 
@@ -84,7 +84,7 @@ def _hold_foot(
     target: TargetBody,
     loose: GeneralizedPosition,
     ankle: str,
-    contacts: Sequence[Sequence[Contact]],  # of toes and heel
+    contacts: Sequence[Sequence[Contact]],  # the contacts of toes and of heel
     frame_time: float,
 ) -> None:
     """Hold the middles of toes and heel where they touch the ground; on one the foot can pivot."""

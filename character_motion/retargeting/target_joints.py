@@ -21,7 +21,7 @@ from msgs_config.character.model import Character, Link
 from msgs_config.errors import ClipError, one_of
 from msgs_config.geometry import rotations
 
-_CROSSING = 1e-3  # of the least squares' smallest singular value, below which axes are parallel
+_CROSSING = 1e-3  # smallest singular value over the largest, below which axes are parallel
 _ROLES_OF_PARTS = {
     part: role for chain in (LEG, ARM) for role, parts in chain for part in parts
 }  # the last role that a part may be
@@ -137,7 +137,7 @@ def _with_segments(links: Sequence[Link], nearest: SkeletonMap, parts: Parts) ->
                 above = segments[role]
     for role, below in (("head", "chest"), ("chest", "pelvis")):
         if role in segments and not _moving_between(links, nearest[below], nearest[role]):
-            del segments[role]  # it moves with the one below
+            del segments[role]  # it moves with the segment below
     return TargetJoints(SkeletonMap(segments), joints)
 
 

@@ -33,7 +33,7 @@ class Surroundings(NamedTuple):
     """What is around a character in a state; None is what its behaviour does not need."""
 
     contacts: FloatArray | None = None  # (links, 6) as in an observation
-    opponent: FloatArray | None = None  # (3,) likewise
+    opponent: FloatArray | None = None  # (3,) as in an observation
 
 
 class Observation(NamedTuple):
@@ -48,7 +48,7 @@ class Observation(NamedTuple):
     upcoming: ReferenceState  # of the own reference, one tick later
     gains: GainArrays  # in force
     whole_gains: GainArrays  # of joints at full strength
-    strengths: FloatArray  # (b,) by which those in force are weaker
+    strengths: FloatArray  # (b,) the share of the whole gains that is in force
     assisted: bool  # whether the gains in force drive a floating base
     opponent: FloatArray | None = None  # (3,) m, world: the root of the opponent, if it has one
     course: Course | None = None  # of a reference that is steered

@@ -12,7 +12,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 
-_FIRM_AGAIN = 0.2  # s, in which the joints are as firm as before a hit
+_FIRM_AGAIN = 0.2  # s, after which the joints are as firm as before a hit
 _REACH = 3.0  # joints, from the struck link to those that are as firm as before
 
 
@@ -93,7 +93,7 @@ class ReactionGains:
     def soft(self, seen: Observation, elapsed: float) -> GainArrays:
         """Soft near the struck link, with a bounded force on the root."""
         force = self._root_force
-        arm = float(seen.now.configuration.position[2])  # of the root's force about the feet
+        arm = float(seen.now.configuration.position[2])  # lever of the root's force about the feet
         strengths = self._softness * seen.strengths
         return self._profile.gains(seen.whole_gains, strengths, force, force * abs(arm))
 
@@ -151,7 +151,7 @@ def _distances(character: Character, struck: int) -> FloatArray:
     while (parent := character.links[child].parent) >= 0:  # up to the base
         distances[parent] = distances[child] + steps[child]
         child = parent
-    for number, link in enumerate(character.links):  # and down again; parents come first
+    for number, link in enumerate(character.links):  # down to all links; parents come first
         if link.parent >= 0:
             distances[number] = min(distances[number], distances[link.parent] + steps[number])
     return distances

@@ -24,7 +24,7 @@ from msgs_config.geometry import elementary, fixed_order, rotations
 
 _RATE = 30.0  # samples a second
 _WINDOW = 7  # samples, 0.2 s
-_SHORTEST = 0.05  # m, of a link
+_SHORTEST = 0.05  # m, the least length of a link
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from msgs_config.geometry import fixed_order, rotations
 
 _UP = np.array((0.0, 0.0, 1.0))
 _FORWARD = np.array((1.0, 0.0, 0.0))
-_FALLEN_TILT = math.radians(60.0)  # from the target's upright
-_FALLEN_HEIGHT = 0.5  # of the target's root
-_FALLEN_DROP = 0.2  # of the rest pose's height, below the target's root: what lies cannot fall
+_FALLEN_TILT = math.radians(60.0)  # rad, between the upward axes of body and target
+_FALLEN_HEIGHT = 0.5  # share of the height of the target's root
+_FALLEN_DROP = 0.2  # share of the rest height, below the target's root: what lies cannot fall
 
 
 class Posture:

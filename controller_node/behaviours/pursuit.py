@@ -28,7 +28,7 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Parameter, Values
 
 _TURN_SPEED = 3.0  # rad/s, of the target's heading at most
-_STANDING = 0.8  # of the height of the own reference's root: an opponent below it is down
+_STANDING = 0.8  # share of the own reference's root height: an opponent below it is down
 _CLEARANCE = 2.0  # m, to which it goes away from an opponent that is down
 _NEAREST = 1e-3  # m; nearer than that no way leads to the opponent
 _ONTO = 0.3  # s, until a strike's motion is reached

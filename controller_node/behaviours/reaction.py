@@ -33,8 +33,8 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 
-_SEVERE = 2.0 / 3.0  # of the threshold above which it goes limp: the full reaction
-_ONTO = 0.6  # of the blend's duration, until the motion that was found is reached
+_SEVERE = 2.0 / 3.0  # share of `limp.threshold`: from there on a hit has the full reaction
+_ONTO = 0.6  # share of the blend's duration until the motion that was found is reached
 _STILL_SPEED = 0.1  # m/s: it lies still with less kinetic energy than all of it at that speed
 _STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
 
@@ -67,7 +67,7 @@ class Reaction:
         self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
         self._target: Target = self._own
-        self._hit = Hit(0, 0.0)  # the last one
+        self._hit = Hit(0, 0.0)  # the hit that was reacted to last
         self._begin(0.0, Mode.TRACK, self._begin_tracking, self._phase_gains.firm)
 
     @property
@@ -156,7 +156,7 @@ class Reaction:
         """Go on with the motion that is nearest to what the present state leads to."""
         library = self._kit.library
         assert library is not None
-        self._detector.reset()  # what was reacted to
+        self._detector.reset()  # forget the hit that was reacted to
         match = library.nearest(library.predicted(self._led(seen), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
         facts = {"to": "clip", "assistance": seen.assistance(), **match.content()}

@@ -67,18 +67,18 @@ REACTION_PARAMETERS = [
 class ReactionSettings:
     """The settings of `active_ragdoll`, `pursuit` and `reactive`."""
 
-    searches: bool  # reactive
+    searches: bool  # whether it searches the library: the behaviour `reactive`
     hit_threshold: float  # N s
     limp_threshold: float  # N s
     react_duration: float  # s
     softness: float
-    assistance: float  # weights
+    assistance: float  # largest root force while it gives way, in weights
     blend_duration: float  # s
     library: tuple[str, ...]
     upright_torque: float  # N m, of active_ragdoll and pursuit
-    by_clip: bool  # gets up by a clip
+    by_clip: bool  # whether it gets up by a clip
     recovery_duration: float  # s
-    face_up: str  # clips
+    face_up: str  # the get-up clips of lying on the back, and on the front
     face_down: str
 
 

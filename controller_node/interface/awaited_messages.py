@@ -65,7 +65,7 @@ class AwaitedMessages:
             opponent = self._opponent.at(stamp_ns)
             if opponent is None:
                 return None
-        if self._contacts is not None:  # afterwards: it has those of a state once
+        if self._contacts is not None:  # last: it hands out the contacts of a state only once
             contacts = self._contacts.until(stamp_ns, episode_ns)
             if contacts is None:
                 return None

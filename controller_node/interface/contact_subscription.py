@@ -27,7 +27,7 @@ class ContactSubscription:
         self._inbox = node.subscription(topics.CONTACTS)
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._once_logger = logger
-        self._until_ns = -1  # of the last state of the episode that has had its contacts
+        self._until_ns = -1  # stamp of the episode's last state whose contacts were handed out
         self._newest_ns = -1
         self._wrenches = dict[int, FloatArray]()  # by stamp
 
@@ -74,7 +74,7 @@ class ContactSubscription:
         except MessageError as error:
             self._once_logger.log_once(f"contacts ignored: {error}")
             return
-        if message.stamp_ns < self._newest_ns:  # of a simulator that was started again
+        if message.stamp_ns < self._newest_ns:  # the simulator was started again
             self._wrenches.clear()
             self._until_ns = -1
         self._newest_ns = message.stamp_ns
@@ -82,7 +82,7 @@ class ContactSubscription:
             return
         wrenches = np.zeros((len(self._rows), 6))
         fits = len(message.wrenches) == len(message.links)
-        if fits and (np.abs(message.wrenches) <= _MAX_WRENCH).all():  # NaN is not
+        if fits and (np.abs(message.wrenches) <= _MAX_WRENCH).all():  # NaN is not within
             for link, wrench in zip(message.links, message.wrenches, strict=True):
                 if link in self._rows:
                     wrenches[self._rows[link]] += wrench

@@ -17,7 +17,7 @@ from msgs_config.messages.topic import Topic
 _AXES = tuple(f"{ROOT}_{axis}" for axis in "xyz")
 _MOST_AT_ONCE = 1000  # messages; a flood of them must not keep the own states waiting
 _EXPLAIN_AFTER = 2.0  # s of wall time
-_MOST_KEPT = 5000  # ticks whose own states are yet to come, as of contacts
+_MOST_KEPT = 5000  # ticks whose own states are yet to come, as many as the queue of states holds
 
 
 def states_of(node: BusNode, opponent: str) -> Topic:
@@ -90,7 +90,7 @@ class OpponentSubscription:
         if not all_finite(place):
             self._once_logger.log_once(f"state on '{self._name}' ignored: it is not finite")
             return
-        if state.stamp_ns < max(self._places, default=0):  # of a simulator that was started again
+        if state.stamp_ns < max(self._places, default=0):  # the simulator was started again
             self._places.clear()
         self._places[state.stamp_ns] = place
         if len(self._places) > _MOST_KEPT:

@@ -11,7 +11,7 @@ from msgs_config.messages import topics, typed
 FIELDS = ("x", "y", "z", "time", "cost", "alternative", "anchor_x", "anchor_y", "anchor_yaw")
 """Of each point: m; s after the state; costs; m and rad, where the reference's world is."""
 
-_WIDTH = 8  # bytes
+_WIDTH = 8  # bytes of a double
 _FIELD = "sensor_msgs/msg/PointField"
 
 

@@ -33,7 +33,7 @@ class Reply(NamedTuple):
     raw_state: bytes
     state: StampedState
     effort: FloatArray  # (n,), of which the commanded entries are sent
-    torques: bytes  # the message
+    torques: bytes  # the serialised message
     session: str  # of the simulator whose state it is
     reference: StampedReference
 

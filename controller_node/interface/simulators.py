@@ -21,7 +21,7 @@ from msgs_config.messages.session import (
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
 _MOST_KNOWN = 8  # simulators of which something is kept
 _MOST_AT_ONCE = 1000  # foreign states in a row
-_EXPLAIN_AFTER = 2.0  # s without a word of the episode
+_EXPLAIN_AFTER = 2.0  # s without a message that says when the episode began
 _ALONE_AFTER = 1.0  # s in which another simulator would have been discovered
 
 
@@ -61,7 +61,7 @@ class Simulators:
         self._now = 0.0
         self._lacks_episode_since: float | None = None
         self._disagrees_since: float | None = None
-        depth = 2 * _MOST_KNOWN  # one of the one must not push out one of the other
+        depth = 2 * _MOST_KNOWN  # messages of one simulator must not push out another's
         self._episodes = node.subscription(topics.EPISODE.for_listener(depth))
         self._configurations = node.subscription(_CONFIGURATION.for_listener(depth))
         self.runs_on = False
@@ -228,9 +228,9 @@ class Simulators:
         if self._binding.bound != found.session:
             return
         if not is_first:
-            return  # a reset has changed it; `disagrees` tells
+            return  # a reset has changed the configuration; `disagrees` says so
         if known.error is not None and self._binding.release():
-            self._pass_over(known.error)  # its first state came before it
+            self._pass_over(known.error)  # the first state came before the configuration
             return
         self._judge(known)
 

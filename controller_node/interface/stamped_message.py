@@ -7,7 +7,7 @@ from msgs_config.errors import MotionError
 from msgs_config.messages import typed
 
 _MAX_BYTES = 2**25  # bytes of a message
-_LATEST_NS = 10**15  # after now
+_LATEST_NS = 10**15  # ns that a stamp may be after that of the present state
 
 
 def decode_stamped(raw: bytes, type_name: str, what: str, state_ns: int) -> tuple[Any, int]:

@@ -15,14 +15,14 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_PERTURBED_AT = 0.28  # m of the centre of mass from the reference's: it is perturbed
-_FAST = 0.8  # m/s likewise; a walk that is not pushed reaches 0.63
-_PERTURBED_SECONDS = 1.0  # s after which that is over; also after the reference has come to stand
+_PERTURBED_AT = 0.28  # m from the reference's centre of mass at which it is perturbed
+_FAST = 0.8  # m/s off the reference at which it is perturbed; an unpushed walk reaches 0.63
+_PERTURBED_SECONDS = 1.0  # s that it stays perturbed, and that the reference counts as just stopped
 _FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
-_TURNS_IN = 1.0  # s, the heading
-_RETURNS_IN = 3.0  # s, both on the way back
+_TURNS_IN = 1.0  # s, time constant with which the heading gives way
+_RETURNS_IN = 3.0  # s, time constant of place and heading on the way back
 _TRAVELS = 0.02  # m/s of the reference's centre of mass from which on it goes somewhere
-_TURNS = 0.02  # rad/s of its root about z likewise
+_TURNS = 0.02  # rad/s of the reference's root about z from which on it goes somewhere
 _SLOWLY = 0.15  # m/s, at most, of the place on the way back
 
 
@@ -43,7 +43,7 @@ class Anchor:
     place: complex = 0j  # t, m, x + i y
     yaw: float = 0.0  # rad
     calm_from: float = 0.0  # s since the episode began; until then the character is perturbed
-    settled_from: float = 0.0  # s likewise; until then the reference has not stood for long
+    settled_from: float = 0.0  # s in the episode; until then the reference has not stood for long
 
     def is_perturbed(self, time: float) -> bool:
         """Whether the character is at a time in s: the feet go where they catch it."""
@@ -54,7 +54,7 @@ class Anchor:
     ) -> tuple[FloatArray, FloatArray]:
         """A state of the world in the reference's: MuJoCo's position (q,), velocity (n,)."""
         if self.place == 0 and self.yaw == 0.0:
-            return position, velocity  # to the last bit
+            return position, velocity  # unchanged to the last bit
         position, velocity = position.copy(), velocity.copy()
         back = _turn(-self.yaw)
         position[:2] = _pair(back * (complex(*position[:2]) - self.place))

@@ -26,9 +26,9 @@ from msgs_config.geometry import rotations
 
 _SOLVER_ITERATIONS = 6
 _CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world
-_LIMIT = (0.01, 1.0)  # likewise, of hinges' limits
+_LIMIT = (0.01, 1.0)  # time constant in s and damping ratio of the limits of hinges and sliders
 
-_UNUSED = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # of MuJoCo's parts
+_UNUSED = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # MuJoCo's parts
 
 _GROUND = "ground"
 _BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: explicit pairs say what may touch
@@ -164,7 +164,7 @@ def _compile(
     option.timestep = period_s
     option.solver = mujoco.mjtSolver.mjSOL_PGS
     option.iterations = _SOLVER_ITERATIONS
-    option.tolerance = 0.0  # always as many
+    option.tolerance = 0.0  # always the same number of iterations
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.disableflags = sum(
         int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _UNUSED

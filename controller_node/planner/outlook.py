@@ -11,7 +11,7 @@ class Outlook:
     """What a plan is expected to lead to at each of its checks."""
 
     times: FloatArray  # (checks,) s after the first state in which it acts
-    centres: FloatArray  # (checks, 3) m, of mass, in the world
+    centres: FloatArray  # (checks, 3) m, centres of mass in the world
     costs: FloatArray  # (checks,) of the deviations from the reference; the plan's is their sum
-    alternatives: FloatArray  # (checks,) of the best of what was tried besides
+    alternatives: FloatArray  # (checks,) costs of the best other plan that was tried
     anchor: Anchor  # where the reference's world was put

@@ -9,7 +9,7 @@ from controller_node.planner.settings import PlannerSettings
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 
-_FADING = 0.7  # of sensitivities, from plan to plan
+_FADING = 0.7  # factor on sensitivities from plan to plan
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Plan:
     """Offsets over a horizon, and what was learned while they were found."""
 
     seen: int  # tick of the state that it was sought from, since the episode began
-    tick: int  # from which on it acts
+    tick: int  # the first tick in which it acts
     offsets: Offsets
     sensitivities: FloatArray | None  # (k (n - 6), checks f) of features to offsets
     areas: FloatArray  # (k,) ticks of the horizon that each knot counts for

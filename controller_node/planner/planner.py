@@ -51,8 +51,8 @@ class PlannerSnapshot:
 class PendingPlan:
     """A plan that is being sought."""
 
-    seen: int  # tick of the state from which
-    tick: int  # from which on it acts
+    seen: int  # tick of the state that it is sought from
+    tick: int  # the first tick in which it acts
     plan: Future[Plan]
 
 
@@ -94,7 +94,7 @@ class PredictivePlanner:
         self._search = PlanSearch(self._rollouts, self._residual_model, settings, rate_hz)
         self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
-        self._act: Callable[[], object] = int  # it does nothing
+        self._act: Callable[[], object] = int  # called while it waits; `int` does nothing
         self._rate_hz = rate_hz
         self._seed = settings.seed
         self._episode = 0
@@ -277,7 +277,8 @@ class PredictivePlanner:
     ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
         position = self._model.position_of(state.position)
-        velocity = state.velocity.copy()  # a message's cannot be written to: another type
+        # A message's array cannot be written to, which is another type to compiled code.
+        velocity = state.velocity.copy()
         if not self.settings.gives_way:
             return position, velocity
         seen = self._anchor.to_reference_world(position, velocity)

@@ -19,7 +19,7 @@ RECORDED = "recorded"
 
 PLANNING_DELAY = "planning_delay_ticks"
 
-_WEIGHTS = {  # by name: the default, the unit, and of what
+_WEIGHTS = {  # by name: default, unit, and the error that it weighs
     "root_rotation": (5.0, "1/rad", "the root's rotation"),
     "joints": (1.0, "1/rad", "the joints' rotations"),
     "root_spin": (0.3, "s/rad", "the root's angular velocity"),
@@ -84,7 +84,7 @@ PLANNER_PARAMETERS = [
 ]
 
 _SIGMA_TURN = 0.4  # rad, of joints that the character's file says nothing of
-_SIGMA_SLIDE = 0.05  # m
+_SIGMA_SLIDE = 0.05  # m, of sliders that the character's file says nothing of
 
 
 @dataclass(frozen=True)
@@ -95,12 +95,12 @@ class PlannerSettings:
     period: int
     knots: int
     planning_delay: int  # from the state that a plan is sought from to when it acts
-    delay: int  # until a command acts
+    delay: int  # from a state to when the command that answers it acts
     samples: int
     rounds: int
     tolerance: float
     noise: float
-    gives_way: bool  # of the reference, to what it cannot absorb
+    gives_way: bool  # whether the reference gives way to what the character cannot undo
     seed: int
     friction: float
     workers: int

@@ -17,7 +17,7 @@ from msgs_config.parameters import Parameter, Values
 
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
 
-_STRAIGHT = 1e-9  # rad a cycle; below it the geometric series is its limit
+_STRAIGHT = 1e-9  # rad a cycle; below it the limit of the geometric series is taken
 _CycleMotion: TypeAlias = tuple[complex, complex, complex, FloatArray]
 
 

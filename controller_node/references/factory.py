@@ -2,7 +2,7 @@
 
 from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  register their own
 from controller_node.references.base import REFERENCES, Motion
-from controller_node.references.steering import factory as steering  # noqa: F401  as well
+from controller_node.references.steering import factory as steering  # noqa: F401  registers its own
 from msgs_config.character.model import Character
 from msgs_config.parameters import Parameter, Values
 

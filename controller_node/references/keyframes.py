@@ -17,8 +17,8 @@ from msgs_config.parameters import Parameter, Values
 
 KEYFRAMES_DIRECTORY = Path(__file__).parent / "data"
 
-_SHARES = np.linspace(0.0, 1.0, 65)  # of a segment, where its path is compared with the limits
-_NOTICED = 1e-6  # rad or m
+_SHARES = np.linspace(0.0, 1.0, 65)  # shares of a segment, where its path is compared with limits
+_NOTICED = 1e-6  # rad or m beyond a limit that lead to a warning
 _FILES = (".yaml", ".yml")
 
 
@@ -38,7 +38,7 @@ class KeyframesReference:
         """The desired state `time` seconds after the episode's first state."""
         if self._period is not None:
             time = (time - self._first) % self._period
-            if time >= self._period:  # a modulo of less than nothing can round up
+            if time >= self._period:  # the modulo of a tiny negative time can round up to it
                 time = 0.0
         return self._curve.sample(time)
 
@@ -87,7 +87,7 @@ def _parabolas(
     accelerations = 2.0 * (after - before) / both
     if loops:
         return _closed(velocities), _closed(accelerations)
-    ends = ((1, 1), (0, 0))  # at rest
+    ends = ((1, 1), (0, 0))  # zeros before and after: at rest at both ends
     return np.pad(velocities, ends), np.pad(accelerations, ends)
 
 
@@ -98,7 +98,7 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     limits, curve = JointLimits(character), curve_through(character.layout, keyframes)
     begin = keyframes.times[0] if keyframes.period is not None else 0.0
     at_keyframes = keyframes.configurations.position
-    lower = np.minimum(limits.lower, at_keyframes.min(axis=0))  # a rest pose may lie beyond
+    lower = np.minimum(limits.lower, at_keyframes.min(axis=0))  # a rest pose may lie beyond limits
     upper = np.maximum(limits.upper, at_keyframes.max(axis=0))
     warnings = []
     for index in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():

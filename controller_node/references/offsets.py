@@ -44,8 +44,8 @@ class RecordedPlan:
     """Offsets that acted, one plan after another; ticks count from the first state."""
 
     rate_hz: int
-    ticks: int  # at which it is over
-    parts: tuple[tuple[int, Offsets], ...]  # each from a tick on, rising
+    ticks: int  # the tick at which the plan is over
+    parts: tuple[tuple[int, Offsets], ...]  # each with the tick from which on it acts, rising
 
     def content(self, dofs: Sequence[str]) -> dict[str, Any]:
         """The plan as a file has it; `dofs` are the names of the actuated entries."""

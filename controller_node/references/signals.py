@@ -164,7 +164,7 @@ def _chosen(
 
 
 def _check_number(what: str, value: float, minimum: float = -LARGEST_NUMBER) -> None:
-    if not minimum <= value <= LARGEST_NUMBER:  # NaN is not
+    if not minimum <= value <= LARGEST_NUMBER:  # NaN is not within
         raise MotionError(f"{what} is {value:g}; it must be from {minimum:g} to {LARGEST_NUMBER:g}")
 
 

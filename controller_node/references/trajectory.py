@@ -18,7 +18,7 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import LayoutError, MotionError
 
-_SAME_POSITION = 1e-3  # rad or m, of a first point at time 0 from where the reference is
+_SAME_POSITION = 1e-3  # rad or m that a first point at time 0 may be away from the reference
 _MOST_WAITING = 100  # trajectories
 _MOST_POINTS = 10_000
 _STOPPED = 1e-6  # rad/s or m/s

@@ -37,7 +37,7 @@ _WALKS: Mapping[str, Mapping[str, object]] = {
     "planner": {"planner": "predictive"},
 }
 _PUSH_COMMANDS, _PUSH_TIME, _PUSH_END = "0.6,0,0@0.2", 3.0, 6.5
-_USUAL, _FINE = (4, 4), (12, 6)  # directions, runs for each
+_USUAL, _FINE = (4, 4), (12, 6)  # directions, and runs for each direction
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:

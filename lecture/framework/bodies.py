@@ -25,7 +25,7 @@ class Box:
     name: str
     mass: float  # kg
     edges: Vector  # m
-    centre: Vector = (0.0, 0.0, 0.0)  # of mass, m in the link frame
+    centre: Vector = (0.0, 0.0, 0.0)  # centre of mass, m in the link frame
 
     @property
     def inertia(self) -> FloatArray:
@@ -86,7 +86,7 @@ def _listed(numbers: Sequence[float]) -> str:
 class Momenta:
     """The momentum of a body as a whole, in each of t states; world axes."""
 
-    centre: FloatArray  # (t, 3) of mass, m
+    centre: FloatArray  # (t, 3) centre of mass, m
     linear: FloatArray  # (t, 3) kg m/s
     angular: FloatArray  # (t, 3) kg m^2/s, about the world's origin
 

@@ -31,10 +31,10 @@ class StudyResult:
     def __init__(self, name: str) -> None:
         """`name` is the study's; the table and the pictures without another name have it."""
         self.name = name
-        self.rows: list[Row] = []  # of the table; each has the same columns
+        self.rows: list[Row] = []  # rows of the table; each has the same columns
         self.figures: dict[str, Figure] = {}  # by the name of their files
-        self.curves: dict[str, Mapping[str, FloatArray]] = {}
         # by the name of a CSV file: columns (t,) by their names
+        self.curves: dict[str, Mapping[str, FloatArray]] = {}
         self.remarks: list[str] = []  # sentences about the result
 
     @property

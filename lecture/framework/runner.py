@@ -19,7 +19,7 @@ Report = Callable[[str, float], None]
 """Called with a run's label and the share of it that is done."""
 
 _DIVERGED = "diverged at tick"
-_UNREAD = [  # topics, at a cost each tick
+_UNREAD = [  # topics that nothing reads, at a cost each tick
     "odom",
     "visualization",
     "description_joint_states",
@@ -65,7 +65,7 @@ class Runner:
         _check_pushes(case.pushes, recording)
         if not self._keep_runs:
             shutil.rmtree(directory)
-            with suppress(OSError):  # others are kept there
+            with suppress(OSError):  # other runs may be kept there
                 directory.parent.rmdir()
         return RunResult(recording, summary, diverged)
 

@@ -27,8 +27,8 @@ class RunSpec:
     duration: float  # s
     reference: Mapping[str, object] = field(default_factory=dict)  # `reference`, `clip`, ...
     simulator: Mapping[str, object] = field(default_factory=dict)  # parameters of sim_node
-    controller: Mapping[str, object] = field(default_factory=dict)  # of controller_node
-    pushes: Sequence[PlannedPush] = ()  # each for the simulator's `wrench_duration`
+    controller: Mapping[str, object] = field(default_factory=dict)  # parameters of controller_node
+    pushes: Sequence[PlannedPush] = ()  # each lasts the simulator's `wrench_duration`
     throws: Sequence[str] = ()  # as `--throw` has them
     commands: str = ""  # velocities as `--cmd-vel` has them
     contacts: bool = False  # whether to record them
@@ -52,7 +52,7 @@ class RunResult:
     """A run's recording and summary."""
 
     recording: Recording
-    summary: Mapping[str, object]  # of summary.json
+    summary: Mapping[str, object]  # the content of summary.json
     diverged: str = ""  # why it ended before its time; "" if it did not
 
     def measured(self, name: str) -> float | bool | None:
@@ -83,7 +83,7 @@ class StudyRunner(Protocol):
 class Study:
     """One of the lecture's topics: a module's `TITLE`, `RUNS` and `run`."""
 
-    name: str  # of the module, of the command's argument and of the files
+    name: str  # name of the module, of the command's argument and of the files
     title: str  # one line
     runs: int  # how many it asks for, about; for the progress bar
     fill: Callable[[StudyRunner, StudyResult], None]  # makes the runs, and adds what they show

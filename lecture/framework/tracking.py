@@ -44,7 +44,7 @@ def lag(angle: FloatArray, reference: FloatArray, period: float, longest: float)
     """
     most = min(round(longest / period), (len(reference) - 2) // 2)
     middle = reference[most : len(reference) - most]
-    shifted = np.lib.stride_tricks.sliding_window_view(angle, len(middle))  # by -most, ..., most
+    shifted = np.lib.stride_tricks.sliding_window_view(angle, len(middle))  # shifts: -most to most
     shifted = shifted - shifted.mean(axis=1, keepdims=True)
     lengths = np.linalg.norm(shifted, axis=1)
     products = shifted @ middle  # rows without a mean: that of `middle` adds nothing

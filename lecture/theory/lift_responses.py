@@ -11,8 +11,8 @@ MASS, GRAVITY, TARGET, RATE = 1.0, 9.81, 1.0, 240  # kg, m/s^2, m, Hz
 PERIOD, WEIGHT = 1.0 / RATE, MASS * GRAVITY  # s, N
 STIFFNESS, CRITICAL = 100.0, 20.0  # N/m, N s/m: the character's own
 
-_RESOLUTION = 1.05  # of a bound: one that is stable and one that is not are this near
-_BRACKET = (0.7, 1.4)  # of the bound by theory, where the search begins
+_RESOLUTION = 1.05  # ratio of two stiffnesses between which a bound is found well enough
+_BRACKET = (0.7, 1.4)  # shares of the bound by theory, between which the search begins
 _TAIL = RATE // 2  # states that a steady state is the mean of, where nothing swings
 
 

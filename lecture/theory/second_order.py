@@ -13,7 +13,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 
-_SETTLED = 0.02  # of the way: the usual band of the settling time
+_SETTLED = 0.02  # share of the way: the usual band of the settling time
 
 
 def critical_damping(stiffness: float, mass: float) -> float:

@@ -40,10 +40,10 @@ class DdsPublisher:
             topic.message_type,
             topic.name,
             topic.qos,
-            # each default callback is one thing more that the executor looks at in each turn
+            # Each default callback is one thing more that the executor looks at in each turn.
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
-        # at every tick, so without rclpy's guard of the handle, which none else destroys
+        # Called at every tick, so without rclpy's guard of the handle, which none else destroys.
         self.publish = self._publisher.handle.publish_raw
         self.get_subscription_count = self._publisher.handle.get_subscription_count
 
@@ -121,7 +121,8 @@ class DdsNode(Node):
         found = []
         for info in self.get_publishers_info_by_topic(topic.name):
             name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-            gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)  # as `ros2 topic info -v`
+            # Written as by `ros2 topic info -v`.
+            gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)
             compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
             misfit = reason.strip() if compatibility == QoSCompatibility.ERROR else ""
             name = "" if _UNKNOWN in name else name
@@ -143,7 +144,7 @@ class DdsNode(Node):
             response.success, response.message = answer.success, answer.message
             return response
 
-        # in another group: in the node's an answer that is awaited would keep all others waiting
+        # In a group of its own: in the node's an awaited answer would keep all others waiting.
         group = ReentrantCallbackGroup()
         kind = SetBool if takes_flag else Trigger
         self.create_service(kind, f"~/{service}", respond, callback_group=group)

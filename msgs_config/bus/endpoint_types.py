@@ -45,7 +45,7 @@ class EndpointTypes:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._once_logger = OnceLogger(node.get_logger())
-        self._counts: dict[tuple[str, bool], int] = {}  # of what has been looked at
+        self._counts: dict[tuple[str, bool], int] = {}  # endpoints when last looked at
         self._next_look = 0.0
 
     def look(self) -> None:

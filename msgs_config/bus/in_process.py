@@ -64,7 +64,7 @@ class _Channel:
 
     def __init__(self) -> None:
         self.publishers: list[InProcessPublisher] = []
-        self.deliveries: list[Deliver] = []  # changed in place
+        self.deliveries: list[Deliver] = []  # changed in place: publishers and subscribers share it
 
     def subscribe(self, deliver: Deliver) -> None:
         """Deliver what is latched, and from now on every message."""
@@ -245,7 +245,7 @@ class InProcessNode:
 
     def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> InProcessClient:
         """A client of another node, by its name in this namespace."""
-        del services  # which are those of the node
+        del services  # the node itself knows its services
         return InProcessClient(self._bus, self.resolve_topic_name(node))
 
     def given_parameters(self) -> dict[str, object]:

@@ -33,7 +33,8 @@ class DirectSubscription:
         self, node: Node, topic: Topic, events: SubscriptionEventCallbacks | None = None
     ) -> None:
         """Subscribe; with `events` also to the middleware's events of the subscription."""
-        # as many as the middleware keeps, and like it the newest; a flood must not fill the memory
+        # As many messages as the middleware keeps, and like there the newest ones: a flood must not
+        # fill the memory.
         self._pending: deque[Received] = deque(maxlen=topic.quality.depth)
         self.dropped = 0  # messages, as more came than were taken
         self._node = node
@@ -46,15 +47,15 @@ class DirectSubscription:
             self._keep,  # type: ignore[arg-type]
             topic.qos,
             raw=True,
-            # not one thing more for the executor to look at in each turn; `waiting.py` says it
+            # Without default callbacks, for each of which the executor would look in each turn.
             event_callbacks=events or SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        # without rclpy's guard of the handle, which another thread might destroy: there is none
+        # Without rclpy's guard against another thread that destroys the handle: there is none.
         self._take_message = self._subscription.handle.take_message
 
     def _keep(self, raw: bytes, info: dict[str, int]) -> None:
         most = self._pending.maxlen
-        if most == len(self._pending) and most > 1:  # with a depth of 1 the newest is all
+        if most == len(self._pending) and most > 1:  # with a depth of 1 only the newest is wanted
             if not self.dropped:
                 self._node.get_logger().warning(
                     f"'{self._subscription.topic_name}': more than {most} messages wait to be "

@@ -26,7 +26,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _ROOT_ENTRIES = 6
 _PERIOD = 1.0 / 240.0  # s, a tick's, for which stiffness and damping of supporting joints are bound
-_DAMPED_PERIOD = 1.5 * _PERIOD  # s, that of joints with passive damping
+_DAMPED_PERIOD = 1.5 * _PERIOD  # s, the same for joints with passive damping
 _NEAR_GROUND = 0.01  # m over the lowest point, within which a link stands on the ground
 
 

@@ -45,7 +45,7 @@ class DynamicsModel:
 
     def __setstate__(self, attributes: dict[str, object]) -> None:
         self.__dict__ |= attributes
-        self._find_views()  # a copy's are of the data copied
+        self._find_views()  # a copy needs views of its own data
 
     def _find_views(self) -> None:
         self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M
@@ -317,7 +317,7 @@ def compile_exactly(spec: mujoco.MjSpec, character: Character) -> mujoco.MjModel
     # the joints above it do not move it alone
     model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
     _set_masses(model, [link.mass for link in character.links])
-    model.dof_simplenum[:] = 0  # else a simple body's mass matrix is the one compiled
+    model.dof_simplenum[:] = 0  # else a simple body keeps the mass matrix as compiled
     return model
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 
-_MAX_RATIO = math.sqrt(3.0)  # of a vector of three entries, in its largest entry
+_MAX_RATIO = math.sqrt(3.0)  # largest length of a vector of three entries over its largest entry
 _EPSILON = 1e-9
 
 
@@ -18,7 +18,7 @@ class EffortLimits:
         """Prepare limits (b,), which must not change any more."""
         self.values = values
         self._layout = layout
-        # (n,): where no entry is larger, no vector is too long
+        # (n,) sizes: where no entry is larger, no vector is too long.
         self._harmless = np.repeat(values, layout.vector_lengths) * ((1 - _EPSILON) / _MAX_RATIO)
 
     def clipped(self, effort: FloatArray) -> FloatArray:

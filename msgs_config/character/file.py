@@ -66,7 +66,7 @@ class CharacterFile:
     feet: tuple[str, ...]
     planning: Planning
     sensors: tuple[Sensor, ...]
-    # kinds of what does not count in the URDF, of which no line is printed
+    # Kinds of what does not count in the URDF of which no line is printed.
     left_out: frozenset[str]
     misread: tuple[str, ...]  # the line that says so if the URDF is not in its encoding
 

@@ -13,7 +13,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 ROOT = "root"
 """Name of the floating base's joint to the world."""
-_MAX_LISTS = 16  # of names, whose indices are remembered
+_MAX_LISTS = 16  # lists of names whose indices are remembered
 
 
 class JointType(Enum):
@@ -90,7 +90,7 @@ class JointLayout:
     """The order of all degrees of freedom of a character; `size` (n) entries.
 
     The floating base comes first, then the joints depth-first, as MuJoCo orders its own.
-    Positions are message form: a rotation is a rotation vector, see docs/design.md.
+    Positions are message form: a rotation is a rotation vector, see docs/topics.md.
     """
 
     def __init__(

@@ -202,8 +202,8 @@ class UrdfOptions:
     inertia_from_file: bool = False
     self_collision: bool = False
     fill_inertia: bool = False  # of links that have a mass but no inertia, see `repair_urdf`
-    collisions: bool = True  # else nothing of it collides, and meshes may be missing
-    mimics: bool = True  # else joints that mimic others are joints as any
+    collisions: bool = True  # false: nothing of it collides, and meshes may be missing
+    mimics: bool = True  # false: joints that mimic others are joints as any
 
     @cached_property
     def _read(self) -> ReadUrdf:
@@ -234,7 +234,7 @@ class Placement:
     ) -> tuple[FloatArray, FloatArray]:
         """Positions (..., 3) in m and orientations (..., 4) of the own world, in the world."""
         if self == Placement():
-            return positions, orientations_xyzw  # to the last bit
+            return positions, orientations_xyzw  # unchanged to the last bit
         turn = rotations.about_z(self.yaw)
         return (
             rotations.rotate(turn, positions) + np.array((self.x, self.y, self.z)),

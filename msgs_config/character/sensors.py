@@ -46,7 +46,7 @@ class Noise:
     stddev: scalars.Vector = _ZERO  # of white noise, drawn at each tick
     bias: scalars.Vector = _ZERO  # constant
     bias_stddev: scalars.Vector = _ZERO  # of a constant bias, drawn once from the seed
-    bias_walk: scalars.Vector = _ZERO  # of a bias that walks, after 1 s; it grows with its root
+    bias_walk: scalars.Vector = _ZERO  # of a bias that walks, after 1 s; it grows with time's root
 
     def __bool__(self) -> bool:
         return self != Noise()

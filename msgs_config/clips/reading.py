@@ -23,8 +23,8 @@ from msgs_config.geometry import fixed_order, rotations
 from msgs_config.motion_formats import describe_no_clip
 
 _SUFFIXES = (".txt", ".json")
-_BEGINNING = 256  # bytes, in which an object begins
-_ROOT_COLUMNS = 8  # duration, position, quaternion
+_BEGINNING = 256  # bytes of a file, in which a JSON object begins
+_ROOT_COLUMNS = 8  # 1 for the duration, 3 for the position, 4 for the quaternion
 _SHORTEST_QUATERNION = 0.1
 _LARGEST_NUMBER = 1e6  # m or s
 
@@ -36,7 +36,7 @@ class ClipFrames:
     times: FloatArray  # (f,) s, rising from 0
     positions: FloatArray  # (f, n) message form, except that rotations are in `orientations_xyzw`
     orientations_xyzw: FloatArray  # (f, k, 4)
-    wraps: bool  # whether it goes on from its end
+    wraps: bool  # whether the clip goes on from its end
     bounds: tuple[FloatArray, FloatArray]  # (n,) each, the joint limits
     clamped: tuple[str, ...]  # degrees of freedom that had to be kept within their limits
 
@@ -157,7 +157,7 @@ def is_note(path: Path) -> bool:
 def _check_frames(path: Path, frames: FloatArray) -> None:
     if frames.ndim != 2 or len(frames) < 2:
         raise ClipError(f"{path}: needs two frames or more")
-    sound = np.abs(frames) <= _LARGEST_NUMBER  # NaN is not
+    sound = np.abs(frames) <= _LARGEST_NUMBER  # NaN is not sound
     if not sound.all():
         bad = int(np.argmin(sound.all(axis=1)))
         raise ClipError(f"{path}: frame {bad} holds a number that is not finite, or over 1e6")

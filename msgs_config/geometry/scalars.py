@@ -117,7 +117,7 @@ def log(q_xyzw: Sequence[float]) -> Vector:
     """The rotation vector in rad, of norm at most pi, of a unit quaternion."""
     x, y, z, w = q_xyzw
     sine = math.sqrt(x * x + y * y + z * z)
-    if sine > _TINY_DIVISOR and w > 0.0:  # nearly always, and then with fewer calls
+    if sine > _TINY_DIVISOR and w > 0.0:  # the usual case, in fewer calls
         share = 2.0 * math.atan2(sine, w) / sine
     else:
         share = math.copysign(2.0 * math.atan2(sine, abs(w)) / max(sine, _TINY_DIVISOR), w)

@@ -10,4 +10,4 @@ class Surface(NamedTuple):
 
     vertices: FloatArray  # (m, 3), m
     normals: FloatArray  # (m, 3), outwards, of length one
-    triangles: IntArray  # (k, 3), which vertices
+    triangles: IntArray  # (k, 3), indices of vertices

@@ -43,7 +43,7 @@ _BIG, LITTLE_ENDIAN = (
     _ByteOrder(struct.Struct(f"{sign}iI"), struct.Struct(f"{sign}I"), np.dtype(f"{sign}f8"))
     for sign in "><"
 )
-# by the encapsulation header's first two bytes
+# By the encapsulation header's first two bytes.
 _BYTE_ORDERS = {b"\0\0": _BIG, b"\0\1": LITTLE_ENDIAN}
 
 

@@ -90,7 +90,7 @@ class RunConfiguration:
     mass: float  # kg
     parameters: dict[str, Any]
     probe: DynamicsSample | None = None  # absent from other simulators
-    versions: dict[str, str] = field(default_factory=dict)  # of what it runs with
+    versions: dict[str, str] = field(default_factory=dict)  # of the packages that it runs with
     session: str = ANONYMOUS
 
 

@@ -111,7 +111,7 @@ class _Form:
             starts.append(end + len(gap))
             end += len(gap) + values.nbytes
         self._numbers, self._size = struct.Struct(numbers), end
-        # all doubles are read at once, with the gaps between the lists, which are as long as one
+        # All doubles are read at once, with the gaps between the lists, each as long as one double.
         whole = [start for start, count in zip(starts, self._counts, strict=True) if count]
         self._start = min(whole, default=end)
         firsts = [(start - self._start) // 8 for start in starts]

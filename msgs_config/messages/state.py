@@ -10,7 +10,7 @@ class StampedState:
     """The generalised state at a tick, as `joint_states` carries it.
 
     `effort` (n,) is what was really applied during the tick before; None in the first state of
-    an episode. Units and frames: docs/design.md, "Names, states and torques".
+    an episode. Units and frames: docs/topics.md, "Conventions".
     """
 
     stamp_ns: int

@@ -26,7 +26,7 @@ class TransformsEncoder:
             poses.append(len(content) // 8)
             content += bytes(8 * _POSE)
         self._size = len(content)
-        content += bytes(padding(len(content), 8))  # where there are no frames
+        content += bytes(padding(len(content), 8))  # padding, where there are no frames
         self._words = np.frombuffer(content, dtype="<u4")
         self._doubles = self._words.view("<f8")
         self._stamps = np.array(stamps, dtype=np.intp)

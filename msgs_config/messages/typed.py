@@ -23,7 +23,7 @@ _READERS = {
     b"\0\0": attrgetter("deserialize_cdr_be"),
     b"\0\1": attrgetter("deserialize_cdr_le"),
 }
-_QUATERNION = "geometry_msgs/msg/Quaternion"  # alone has a default that is not zero
+_QUATERNION = "geometry_msgs/msg/Quaternion"  # the only type with a default that is not zero
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 
@@ -109,5 +109,5 @@ def decode(raw: bytes, type_name: str) -> Any:
         name = type_name.rpartition("/")[2]
         raise MessageError(f"{len(raw)} bytes that are no {name}") from error
     return (
-        message  # and what a middleware has left behind it, where it took more room than it needs
+        message  # bytes behind it, which a middleware may leave in too large a buffer, do not count
     )

@@ -63,7 +63,8 @@ def open_missing_streams() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest that is free
+            # It takes the lowest descriptor that is free.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
@@ -216,7 +217,7 @@ def _start_ros(about: str) -> None:
         if others:
             raise ConfigurationError(f"unknown argument {others[0]!r}; {_PARAMETERS_ARE_SET}")
         check_domain_id(os.environ)
-        for file in _parameter_files(sys.argv):  # rcl takes some of them for empty ones
+        for file in _parameter_files(sys.argv):  # rcl takes some files of other kinds for empty
             refuse_other_kind(file, "a file of parameters", (".yaml", ".yml"), ConfigurationError)
         if is_discovery_off(os.environ):
             print(f"warning: {_HIDDEN_WARNING}", file=sys.stderr, flush=True)

@@ -18,7 +18,7 @@ DIRECTORY = Path("/dev/shm")
 LEAST_AGE = 5.0  # s; a process needs some microseconds from the file to the lock
 _SEGMENT = re.compile(r"fastrtps_[0-9a-f]{16}")
 _LOCK = "_el"
-_TRIAL_BYTES = 1  # of a segment without a lock, which shows that there is shared memory
+_TRIAL_BYTES = 1  # size of a segment without a lock, which only tries whether shared memory works
 
 
 def remove_orphans(directory: Path = DIRECTORY) -> list[str]:

@@ -20,7 +20,7 @@ class Throttle:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """The first message is chosen; `clock` is in s."""
         self._clock = clock
-        self._period = -1  # that of the last message
+        self._period = -1  # number of the period of the last message
         self._left_out = False
 
     def chooses(self) -> bool:

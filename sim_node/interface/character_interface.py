@@ -19,7 +19,7 @@ from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 from sim_node.timing.zero_order_hold import ZeroOrderHold
 
-_MS = 1e-6  # of a nanosecond
+_MS = 1e-6  # milliseconds in a nanosecond
 
 
 class CharacterInterface:

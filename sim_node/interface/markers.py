@@ -19,14 +19,14 @@ from msgs_config.messages.cdr import split_stamp
 from msgs_config.messages.throw import ProjectileThrow
 
 _MARKER = "visualization_msgs/msg/Marker"
-_TYPES = {  # the names of its constants
+_TYPES = {  # names of the message's constants
     ShapeType.BOX: "CUBE",
     ShapeType.SPHERE: "SPHERE",
     ShapeType.CYLINDER: "CYLINDER",
     ShapeType.MESH: "MESH_RESOURCE",
 }
 _POSE = 7  # doubles: position and orientation, xyzw
-_FIND_POSE = -7.125e250  # times 1, 2, 3 and so on
+_FIND_POSE = -7.125e250  # times 1, 2, ...: marks the poses in a serialised message
 _BALL_RGBA = (0.85, 0.25, 0.15, 1.0)
 _FIND_SECONDS = -1_987_654_321
 
@@ -64,7 +64,7 @@ class MarkerEncoder:
             self._content[at : at + len(stamp)] = stamp
             self._content[pose_at : pose_at + pose.nbytes] = pose.tobytes()
         content = bytes(self._content)
-        if self._deletes:  # once is enough
+        if self._deletes:  # a ball that is gone is deleted in one message only
             self._serialise(throws, 0)
         return content
 

@@ -107,7 +107,7 @@ class OtherSimulators:
         self._states = states
         self._session = session
         self._once_logger = logger
-        self.seen = False  # at the last look
+        self.seen = False  # whether a topic had more than one publisher at the last `look`
 
     def look(self) -> None:
         """Look at the graph; cheap as long as this node is alone."""
@@ -118,7 +118,7 @@ class OtherSimulators:
 
     def _log(self, topic: Topic) -> None:
         own, found = self._node.get_fully_qualified_name(), _found(self._node, topic)
-        if _UNKNOWN_NODE in found or own not in found:  # they are yet to come
+        if _UNKNOWN_NODE in found or own not in found:  # not all names are known yet
             return
         names = sorted(name for name, gids in found.items() for _ in gids)
         names.remove(own)

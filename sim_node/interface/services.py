@@ -26,7 +26,7 @@ class Services:
         self._step_ticks = step_ticks
         self._resume = resume
         self._reset = reset
-        self._steps: Answer | None = None  # of the call whose steps are not done yet
+        self._steps: Answer | None = None  # answer to the call whose steps are not done yet
         node.offer("pause", self._on_pause, takes_flag=True)
         node.offer("step", self._on_step)
         node.offer("reset", self._on_reset)

@@ -14,7 +14,7 @@ from msgs_config.messages.transforms import TransformsEncoder
 from sim_node.frames import FrameNames
 from sim_node.physics.simulated_character import SimulatedCharacter
 
-_REPETITIONS = 3  # of a state that is published again and again, for a new subscriber
+_REPETITIONS = 3  # times that a state is published again for a new subscriber
 _NO_MOTION = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
@@ -33,8 +33,8 @@ class TransformPublisher:
         self._prefix = character.setup.prefix
         self.publisher = node.publisher(topics.TF)
         self._static = node.publisher(topics.TF_STATIC)
-        self._subscribers = 0  # when it was published last
-        self._repetitions = 0  # still to come
+        self._subscribers = 0  # their number when the moving frames were published last
+        self._repetitions = 0  # how often the state is still to be published again
         self._floats = character.layout.has_floating_base
         base = (self._prefix + frames.odom, self._prefix + joints.root)
         moving = [base] if self._floats else []

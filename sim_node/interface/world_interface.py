@@ -49,7 +49,8 @@ class WorldInterface:
         simulation = self._simulation
         if not simulation.balls:
             return
-        if simulation.stamp_ns != self._published_ns:  # after a pause a tick begins again
+        # A tick that begins again after a pause has published its throws already.
+        if simulation.stamp_ns != self._published_ns:
             self._published_ns = simulation.stamp_ns
             for throw in simulation.throws:
                 yield self._applied, self._codec.encode(simulation.stamp_ns, throw)

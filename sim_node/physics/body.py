@@ -20,7 +20,7 @@ from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
 from sim_node.physics.joint_constraints import couple_joints, set_friction
 from sim_node.physics.touches import TouchedLinks, net_wrenches
 
-_QUATERNION = 4  # numbers; the engine has one for a ball joint
+_QUATERNION = 4  # numbers of a ball joint's position in the engine
 _SEARCH_DISTANCE = 1e3  # m, beyond which the engine need not look for what is near
 
 
@@ -58,8 +58,8 @@ class Body:
         self._base_turn = turns[0]
         self._base_is_inertial = poses[0] == Pose()
         self._base_turn_back: list[float] = self._turns_back[0].tolist()
-        self._base_read: BaseFrame | None = None  # since the engine's last step
-        self._base_centre: scalars.Vector | None = None  # as the engine has it, and as long as that
+        self._base_read: BaseFrame | None = None  # None: not read since the engine's last step
+        self._base_centre: scalars.Vector | None = None  # the base's centre of mass; None: unread
         self._find_joints(character)
         set_link_dynamics(client, self._body, friction, speed_bound)
         pairs = zip(self._joints, self._axes, strict=True)
@@ -89,14 +89,14 @@ class Body:
         self._joints = [numbers[joint.name] for joint in joints]
         self._entries = [joint.entries for joint in joints]
         turns = {link.joint.name: link.inertial_pose.orientation_xyzw for link in character.links}
-        # of each joint; the axes of a ball joint's inertial frame in its link's
+        # Of each ball joint the axes of its link's inertial frame in the link; None of others.
         self._axes = [
             scalars.axes(turns[joint.name]) if joint.type is JointType.SPHERICAL else None
             for joint in joints
         ]
         pairs = zip(self._entries, self._axes, strict=True)
         self._balls = [(entries, axes) for entries, axes in pairs if axes is not None]
-        # most inertial frames are not: then their axes alter nothing but the sign of zeros
+        # Those whose inertial frame is turned; the others' axes alter only the sign of zeros.
         self._turned = [ball for ball in self._balls if ball[1] != scalars.NO_TURN]
 
     def read(self) -> FloatArray:
@@ -112,7 +112,7 @@ class Body:
             states = pybullet.getJointStatesMultiDof(
                 self._body, self._joints, physicsClientId=self._client
             )
-            rotation_vector = scalars.log  # found once, not at each joint
+            rotation_vector = scalars.log  # looked up once, not at each joint
             for value, speed, _, _ in states:
                 position += rotation_vector(value) if len(value) == _QUATERNION else value
                 velocity += speed
@@ -153,7 +153,7 @@ class Body:
         if self._floating:
             self._set_base_velocity(velocity[:3], velocity[3:6])
         motion = list(self._engine_motion(position, velocity))
-        pybullet.resetJointStatesMultiDof(  # of lists alone, tuples crash it
+        pybullet.resetJointStatesMultiDof(  # takes lists only: tuples crash it
             self._body,
             [index for index, _, _ in motion],
             targetValues=[value for _, value, _ in motion],
@@ -181,7 +181,7 @@ class Body:
         if self._floating and any(values[:6]):
             self._apply_to_base(values[:3], values[3:6])
         self._centre_at_step = self._base_centre or self._base_pose()[0]
-        self._base_read = None  # the engine's next step moves it
+        self._base_read = None  # the engine's next step moves the base
         if self._floating:
             self._base_centre = None
 

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.model import Character
 
-_NO_LIMIT = 1e9  # N m or N, of a coupling
-_ENGINE_CORRECTION = 0.2  # of a limit's or contact's excess in a step, the engine's own
+_NO_LIMIT = 1e9  # N m or N: the force of a coupling is not limited
+_ENGINE_CORRECTION = 0.2  # share of a limit's or contact's excess that an engine step corrects
 CORRECTION = 0.1
 """The share of a coupling's error in position that a step takes away."""
 

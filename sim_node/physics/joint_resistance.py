@@ -21,10 +21,10 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from sim_node.physics.joint_constraints import CORRECTION
 
-_LIMIT_CORRECTION = 0.2  # of a limit's excess in a step, as in the engine's own limits
+_LIMIT_CORRECTION = 0.2  # share of a limit's excess that a step corrects, as the engine's own do
 _MOST_TRIALS = 20
-_HEAVY = 1e9  # times a joint's own inertia: added to one that rests, which keeps it there
-_FORCE_ROUNDING = 1e-9  # of a force, that may be wrong without consequence
+_HEAVY = 1e9  # times its own inertia, added to a joint that rests: that keeps it there
+_FORCE_ROUNDING = 1e-9  # share of a force that may be wrong without consequence
 
 
 class JointResistance:

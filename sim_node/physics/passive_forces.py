@@ -31,8 +31,8 @@ from sim_node.physics.joint_resistance import JointResistance
 from sim_node.physics.wrenches import ExternalWrench
 
 _MOST_PIVOTS = 50
-_COUPLING_ERROR = 1e-9  # rad or m, of a coupling
-_FORCE_ROUNDING = 1e-12  # of a force, that may be wrong without consequence
+_COUPLING_ERROR = 1e-9  # rad or m that a follower may be off without a correction
+_FORCE_ROUNDING = 1e-12  # share of a force that may be wrong without consequence
 
 
 class PassiveForces:
@@ -51,7 +51,7 @@ class PassiveForces:
             for joint in character.moving_joints
             if joint.soft_limit is not None
         ]
-        # with the bounds beside them, which each step asks for
+        # Each joint and its limit, with the bounds beside them, which each step asks for.
         self._limits = [(joint, *joint[1].lower, *joint[1].upper) for joint in limited]
         self.resistance = JointResistance(character, step_s)
         self.active = bool(self._limits or self.resistance.active)
@@ -101,7 +101,8 @@ class PassiveForces:
         assert self._model is not None
         self._model.update(position, velocity)
         correction = self._model.coupling_correction(moved, self._step_s)
-        correction[: 6 * self._has_floating_base] = 0.0  # whose place it hardly alters
+        # The base stays where it is: the correction hardly alters its place.
+        correction[: 6 * self._has_floating_base] = 0.0
         entries = self._rotation_entries
         turns = rotations.exp(position[entries])
         position += correction
@@ -144,7 +145,7 @@ class PassiveForces:
 class PassedBound(NamedTuple):
     """A bound of a soft limit that a joint is beyond, or is about to pass."""
 
-    row: Vector  # of J, outwards: `de/dt = row . w` of the angular velocity w in the child frame
+    row: Vector  # row of J, outwards: `de/dt = row . w`, w the angular velocity in the child frame
     explicit: float  # N m, the force if nothing yielded
     implicit: float  # N m s^2/rad, what each rad/s^2 of yielding takes away of it
 

@@ -18,7 +18,7 @@ _SEED = 1
 _ROOT_ENTRIES = 6
 _TURN = 0.3  # rad or m that entries are away from the rest pose, at the most
 _SPEED = 1.0  # rad/s or m/s, at the most
-_DAMPED = 1e-3  # of a speed: what damping may take of it in an instant, and be a derivative
+_DAMPED = 1e-3  # share of a speed that damping may take in an instant, and be a derivative
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
@@ -54,7 +54,7 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
         velocity[rate * INSTANT > _DAMPED] = 0.0
         world.set_gravity(gravity)
         body.set_state(position, velocity)
-        position, velocity = body.read()  # as the engine has it
+        position, velocity = body.read()  # the state that the engine has made of it
         energy = body.kinetic_energy()
         body.apply(effort - character.passive_damping() * velocity)
         world.step()

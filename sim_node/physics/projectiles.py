@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.messages.throw import ProjectileThrow
 
-_AWAY_DISTANCE = 10_000.0  # m along x
+_AWAY_DISTANCE = 10_000.0  # m along x: where a ball lies that was taken out of the way
 
 
 class Projectiles:
@@ -17,8 +17,8 @@ class Projectiles:
     def __init__(self, client: Engine, friction: float) -> None:
         self._client = client
         self._friction = friction
-        self.numbers: list[int] = []  # the engine's
-        self._shapes: dict[float, int] = {}  # by radius
+        self.numbers: list[int] = []  # the engine's number of each ball
+        self._shapes: dict[float, int] = {}  # the engine's number of each shape, by radius
         self.throws: tuple[ProjectileThrow, ...] = ()
 
     def add(self, throw: ProjectileThrow) -> None:

@@ -27,8 +27,8 @@ from msgs_config.parameters import Values
 from msgs_config.shared_parameters import PLANE
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 
-_SHORT_LENGTH = 0.1  # m, of a pendulum that 10 m/s turn by a bound of Bullet's own at 240 Hz
-_LARGEST_TURN = 100.0 / 240.0  # rad or m in an engine step
+_SHORT_LENGTH = 0.1  # m: at 10 m/s such a pendulum turns at Bullet's own bound, 100 rad/s
+_LARGEST_TURN = 100.0 / 240.0  # rad or m in an engine step: Bullet's own bound at 240 Hz
 _MAX_NAMES = 5  # joints or links in a warning
 
 

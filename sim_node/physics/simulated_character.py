@@ -28,7 +28,7 @@ class CharacterSetup:
     commanded_joints: tuple[str, ...]
     initial_position: tuple[float, ...]  # (n,)
     initial_velocity: tuple[float, ...]  # (n,)
-    name: str = ""  # where there are several
+    name: str = ""  # of the character, where there are several
 
     @property
     def prefix(self) -> str:
@@ -65,7 +65,7 @@ class SimulatedCharacter:
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
     pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
-    balls: Projectiles  # of the world that it is in
+    balls: Projectiles  # of the world that the character is in
     speed_bounds: dict[bool, float]
     """Of every degree of freedom in the engine, rad/s or m/s; by whether there is a ground."""
 
@@ -164,7 +164,7 @@ class SimulatedCharacter:
     def end_substep(self) -> None:
         """Put followers where their leaders say, if contacts have moved them away."""
         if self.character.coupling:
-            self.find_contacts()  # which need the links where they were before
+            self.find_contacts()  # first: contacts need the links where they were at the step
             position, velocity = self._body.read()
             if self._passive.couple(position, velocity):
                 self._body.set_motion(position, velocity)
@@ -214,7 +214,7 @@ class SimulatedCharacter:
 
     def link_frames(self) -> tuple[FloatArray, FloatArray]:
         """Origins (links, 3) in m and orientations xyzw (links, 4) of the links in the world."""
-        self.find_contacts()  # which need the links where they were before
+        self.find_contacts()  # first: contacts need the links where they were at the step
         return self._body.link_frames()
 
     def base_frame(self) -> tuple[FloatArray, FloatArray]:

@@ -40,7 +40,7 @@ class Snapshot:
     characters: tuple[CharacterSnapshot, ...]
     throws: tuple[ProjectileThrow, ...]  # of the last tick
     balls: tuple[ProjectileThrow, ...]  # that are in the world
-    thrown_at: tuple[int, ...]  # ticks, of the balls
+    thrown_at: tuple[int, ...]  # the tick at which each ball was thrown
     world: bytes  # the engine's state
 
 
@@ -77,7 +77,8 @@ class Simulation:
         )
         self.tick = first_tick
         self.episode = 1
-        # Finding out what touches takes time: with substeps in each of them, else if it is read.
+        # Finding out what touches takes time: it is done in each of several substeps, and after a
+        # single one only if it is read.
         self.watches_contacts = False
         self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
@@ -164,7 +165,7 @@ class Simulation:
             for character in self.characters:
                 character.check_divergence(self.tick)
         except SimulationError:
-            self.tick -= 1  # that state is not published; a reset's first one has its stamp
+            self.tick -= 1  # that state is not published; the first one after a reset has its stamp
             raise
 
     def _move_balls(self, throws: Sequence[ProjectileThrow]) -> None:

@@ -10,18 +10,18 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.world import World, WorldSettings
 
-_TOUCHING_DISTANCE = 1e-6  # m that count as touching
-_MOST_RADII = 20_000.0  # from the place where it is let go
-_LAST_STEPS = 1000  # nearer than a radius, until it touches
+_TOUCHING_DISTANCE = 1e-6  # m: what is nearer counts as touching
+_MOST_RADII = 20_000.0  # radii of the ball that it may come from at most
+_LAST_STEPS = 1000  # at most, from nearer than a radius until the ball touches
 
 
 @dataclass(frozen=True)
 class Impact:
     """A ball that touches a link, having come straight towards the link's centre of mass."""
 
-    target: FloatArray  # (3,) m, world: the centre of mass
+    target: FloatArray  # (3,) m, world: the link's centre of mass
     centre: FloatArray  # (3,) m, world: the ball's
-    before: tuple[str, ...]  # links that it would have met on its way
+    before: tuple[str, ...]  # links that the ball would have met on its way
 
 
 class BallAndCharacter:
@@ -123,7 +123,7 @@ def _trace(
     for _ in range(_LAST_STEPS + round(distance / radius)):
         if gaps[row] < _TOUCHING_DISTANCE:
             return left, met - {row}
-        left -= min(gaps[row], radius)  # or it would jump over what is in the way
+        left -= min(gaps[row], radius)  # a longer step could jump over what is in the way
         gaps = both.put_ball(target + left * origin)
         met |= set(np.flatnonzero(gaps < 0.0).tolist())
     return None, met

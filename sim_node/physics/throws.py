@@ -13,7 +13,7 @@ MOST_BALLS = 100
 class ThrowQueue:
     """The throws of an episode that wait, in the order in which they were sent."""
 
-    _queue: list[tuple[int, ProjectileThrow]] = field(default_factory=list)  # with the tick
+    _queue: list[tuple[int, ProjectileThrow]] = field(default_factory=list)  # each with its tick
     _taken: int = 0
 
     def add(self, throw: ProjectileThrow, first_tick: int) -> None:

@@ -11,7 +11,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 class Touch(NamedTuple):
     """One contact as one of its two links feels it; world axes."""
 
-    link: int  # the engine's number
+    link: int  # the engine's number of the link
     force: Sequence[float]  # (3,) N
     point: Sequence[float]  # (3,) m, where the engine let the force act
 
@@ -29,7 +29,7 @@ def net_wrenches(
     of mass when the engine's step began. A contact between two links of the body counts on
     both, in opposite directions. `rows` are those of the engine's numbers of links.
     """
-    sums: dict[int, list[float]] = {}  # by row; plain numbers: of few contacts it is faster
+    sums: dict[int, list[float]] = {}  # by row; plain numbers are faster for few contacts
     for number, (fx, fy, fz), (px, py, pz) in touches:
         row = rows[number]
         cx, cy, cz = centres[row]

@@ -19,9 +19,9 @@ from sim_node.physics.engine_defaults import UNLIMITED_SPEED
 from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.touches import Touch, TouchedLinks
 
-_STATE_FILE = "state.bullet"  # the engine writes to files alone
-_RAYS = 10_000  # of one call; the engine takes 16,383
-_DEEPEST = 1000.0  # m below a point that is looked for a surface
+_STATE_FILE = "state.bullet"  # the engine saves its state to files only
+_RAYS = 10_000  # rays in one call; the engine takes up to 16,383
+_DEEPEST = 1000.0  # m: how far below a point a surface is looked for
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class WorldSettings:
     friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
     link_friction: float = 0.5  # of every link
     solver_iterations: int = 10
-    contact_breaking_threshold: float = 0.02  # the engine's own; see `sim_node`'s parameter
+    contact_breaking_threshold: float = 0.02  # the engine's own; see the parameter of `sim_node`
     ground: bool = True  # the plane z = 0
     terrain: UrdfOptions | None = None  # a fixed body beside the plane
 
@@ -46,7 +46,7 @@ class World:
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
-    # in force; the engine has one for all worlds of a process
+    # The threshold in force: the engine has one for all worlds of a process.
     _breaking_threshold: ClassVar[float] = WorldSettings.contact_breaking_threshold
     _stepping: ClassVar = fork_safe_lock()  # worlds may step in several threads
 
@@ -85,7 +85,7 @@ class World:
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
         self.balls = Projectiles(self._client, settings.link_friction)
-        self._touched: TouchedLinks | None = None  # not asked for since the last step
+        self._touched: TouchedLinks | None = None  # None: not asked for since the last step
 
     def __enter__(self) -> "World":
         return self
@@ -133,13 +133,14 @@ class World:
 
     def _find_touched(self) -> TouchedLinks:
         touched = defaultdict[int, list[Touch]](list)
-        # of all bodies: asked for those of one, the engine lets it come first in each, and then
-        # turns the normal round but not the friction
+        # The contacts of all bodies: asked for those of one body, the engine lets it come first in
+        # each contact, and then turns the normal round but not the friction.
         for contact in pybullet.getContactPoints(physicsClientId=self._client):
             _, body, body_b, link, link_b, at, at_b, normal, distance, f, f1, a, f2, b = contact
             if distance > 0.0 and f == 0.0:
                 continue  # near enough to be watched by the engine, but apart
-            x = f * normal[0] + f1 * a[0] + f2 * b[0]  # written out: at each tick, of each
+            # Written out, because it is done for each contact at each tick.
+            x = f * normal[0] + f1 * a[0] + f2 * b[0]
             y = f * normal[1] + f1 * a[1] + f2 * b[1]
             z = f * normal[2] + f1 * a[2] + f2 * b[2]
             touched[body].append(Touch(link, (x, y, z), at))

@@ -8,9 +8,9 @@ from msgs_config.character.sensors import Noise
 from msgs_config.geometry import scalars
 from msgs_config.random_words import random_words
 
-_WORDS = 4  # for three normal numbers
+_WORDS = 4  # random words that three normal numbers are made of
 _STEP = 2.0**-53
-_WHITE, _BIAS, _WALK = range(3)  # what is drawn
+_WHITE, _BIAS, _WALK = range(3)  # the kinds of numbers that are drawn
 _PATH = 256  # drawn numbers of the walk that are remembered; a tick needs about 40
 
 
@@ -25,7 +25,7 @@ class NoiseSource:
         self._walk_per_tick = _scale(math.sqrt(tick_s), noise.bias_walk)
         drawn = self._draw(_BIAS, 0)
         self._bias = _add(noise.bias, _multiply(noise.bias_stddev, drawn))
-        # mostly the tick before had the same numbers
+        # Remembered, because the tick before mostly had the same numbers.
         self._walk_step = lru_cache(maxsize=_PATH)(partial(self._draw, _WALK))
 
     def at(self, tick: int) -> scalars.Vector:
@@ -45,7 +45,7 @@ class NoiseSource:
         """
         high, at_high = 1, self._walk_step(1)
         low, at_low = 0, (0.0, 0.0, 0.0)
-        while high < tick:  # from a power of two to the next, which is as far as from 0
+        while high < tick:  # from a power of two to the next, as far away as 0 is
             low, at_low = high, at_high
             high, at_high = 2 * low, _add(at_low, _scale(math.sqrt(low), self._walk_step(2 * low)))
         while tick < high:

@@ -43,7 +43,7 @@ class SensorReader:
         """Find the sensor's link, and make the sources of its noise."""
         self._character, self._sensor, self._settings = character, sensor, settings
         self._kinematics = LinkKinematics(character.character, sensor.link)
-        self._axes = scalars.axes(sensor.orientation_xyzw)  # of the sensor, in the link
+        self._axes = scalars.axes(sensor.orientation_xyzw)  # the sensor's axes in the link frame
         name = f"{character.setup.prefix}{sensor.name}"
         self._noise = {
             quantity: NoiseSource(noise, settings.seed, f"{name}.{quantity}", settings.tick_s)
@@ -111,7 +111,7 @@ class ImuReader(SensorReader):
     def _motion(self, state: StampedState) -> Motion:
         """The motion of the sensor's frame in a state."""
         read_state, motion = self._last
-        if read_state is not state:  # mostly that before was the present one a tick ago
+        if read_state is not state:  # the state before was mostly read a tick ago
             link = self._kinematics.motion(state.position.tolist(), state.velocity.tolist())
             motion = link.at(self._sensor.position, self._sensor.orientation_xyzw)
         return motion

@@ -15,13 +15,14 @@ class FlowControl:
     waited for again until it has.
     """
 
-    acknowledged: Callable[[float], bool]  # whether all have all, or get it within so many s
+    # Whether every subscriber has all messages, or gets them within so many seconds.
+    acknowledged: Callable[[float], bool]
     log: Callable[[str], None]
     active: bool = True
-    every_ticks: int = 1000  # between questions; a publisher keeps the last 5000 messages
-    longest: float = 30.0  # s of wall time
-    turn: float = 0.02  # s of it between looks at everything else
-    _last_tick: int = 0  # at which they were asked
+    every_ticks: int = 1000  # between calls of `acknowledged`; a publisher keeps 5000 messages
+    longest: float = 30.0  # s of wall time that subscribers are waited for
+    turn: float = 0.02  # s of wall time in one wait, between looks at everything else
+    _last_tick: int = 0  # at which subscribers were asked for the last time
     _gives_up_at: float = math.inf
     _has_given_up: bool = False
 

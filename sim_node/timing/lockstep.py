@@ -11,7 +11,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray, all_finite
 from msgs_config.errors import CommandError
 
-_REMEMBERED = 1000  # ticks
+_REMEMBERED = 1000  # past ticks whose commands are remembered
 NO_LEADERS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -19,8 +19,8 @@ class CommandStatus(StrEnum):
     """The verdict on a command."""
 
     ACCEPTED = "accepted"
-    DUPLICATE = "duplicate"  # repeats one that was accepted
-    CONFLICT = "conflict"  # differs from another for the same state
+    DUPLICATE = "duplicate"  # repeats a command that was accepted
+    CONFLICT = "conflict"  # differs from another command for the same state
     STALE = "stale"  # answers an earlier state, and comes too late
     FUTURE = "future"  # answers a state that was never published
     REJECTED = "rejected"  # malformed; nothing of it is taken
@@ -35,7 +35,7 @@ class CommandCollector(ABC):
         """Only entries that are `allowed` (n,) may be commanded; `leaders` are by the follower."""
         self._dof_names, self._leaders = tuple(dof_names), leaders
         self._allowed = allowed
-        self._allowed_indices: IntArray | None = None  # the last ones that were
+        self._allowed_indices: IntArray | None = None  # the last that were found allowed
         self.stamp_ns = 0
         self.conflict: str | None = None  # the first entry of the tick's last conflict
         self.counts: Counter[CommandStatus] = Counter()
@@ -65,7 +65,7 @@ class CommandCollector(ABC):
             worst = int(np.argmin(np.isfinite(effort)))
             name = self._dof_names[indices[worst]]
             raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
-        if indices is not self._allowed_indices:  # those of one sender are one array
+        if indices is not self._allowed_indices:  # a sender's are one array, checked once
             self._check_allowed(indices)
             self._allowed_indices = indices
 
@@ -121,7 +121,7 @@ class LockstepBarrier(CommandCollector):
 
     def _begin(self) -> None:
         self._tick = _Tick(len(self._allowed))
-        self._filled: BoolArray | None = None  # (n,) without a command of a sender
+        self._filled: BoolArray | None = None  # (n,) entries that no sender has commanded
         self.complete = self._required == 0
         """Whether every required entry has its command."""
         self.conflict = None

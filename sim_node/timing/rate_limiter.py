@@ -4,8 +4,8 @@ import math
 
 from msgs_config.runtime.durations import Durations
 
-_LONGEST_BACKLOG = 0.1  # s that is caught up with; beyond it the schedule starts over
-_TOLERATED_SHARE = 0.01  # of deadlines that may be missed
+_LONGEST_BACKLOG = 0.1  # s of lateness that are made up for; beyond it the schedule starts over
+_TOLERATED_SHARE = 0.01  # share of deadlines that may be missed without a warning
 
 
 class RateLimiter:
@@ -15,7 +15,7 @@ class RateLimiter:
         self.period = period
         self.missed = 0  # ticks that began after the next one was due
         self._scheduled = 0  # ticks that were due by the wall clock
-        self._warned_of = (0, 0)  # of the two, when `take_warning` judged last
+        self._warned_of = (0, 0)  # `missed` and `_scheduled` when `take_warning` judged last
         self._due_at = -math.inf
         self._last: float | None = None  # when the last tick began
         self._lateness = Durations()

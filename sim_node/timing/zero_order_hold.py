@@ -32,7 +32,7 @@ class ZeroOrderHold(CommandCollector):
         self._effort = np.zeros(len(allowed))
         self._given_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
         self._stamp_of_command_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
-        self._oldest_ns = 0  # of the states that a command of this episode can answer
+        self._oldest_ns = 0  # stamp of the oldest state that a command of this episode can answer
         self.timeout_ns = timeout_ns
         self.timeouts = 0  # times that a held command became too old
         self._was_held = np.zeros(len(allowed), dtype=np.bool_)

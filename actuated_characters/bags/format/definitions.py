@@ -17,9 +17,9 @@ from msgs_config.messages.topic import find_message_class
 class MessageDefinition(NamedTuple):
     """A message type as a bag describes it, so that any reader can decode it."""
 
-    type_name: str  # as "sensor_msgs/msg/JointState"
+    type_name: str  # such as "sensor_msgs/msg/JointState"
     text: str  # the .msg file, then the .msg files of all types in it, each below its name
-    type_hash: str  # of REP 2016, "RIHS01_" and 64 hexadecimal digits
+    type_hash: str  # as REP 2016 defines it: "RIHS01_" and 64 hexadecimal digits
 
 
 @cache

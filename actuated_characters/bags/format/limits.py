@@ -6,18 +6,18 @@ A declared size may be a reason to reject a file; unpacking itself ends at the l
 from pathlib import Path
 
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
-from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # as this Python has it
+from rosbags.rosbag2.reader import zstd  # type: ignore[attr-defined]  # compression's or backports'
 
 from actuated_characters.bags.format.storage import ZSTD
 
 MIB = 1 << 20
 MOST_OF_MESSAGE = 64 * MIB  # bytes; a large image has 50 million
-MOST_OF_CHUNK = 128 * MIB  # bytes, together with those of overlapping times; mostly it is 1 MiB
+MOST_OF_CHUNK = 128 * MIB  # bytes, together with chunks of overlapping times; mostly one has 1 MiB
 MOST_SORTED = 1024 * MIB  # bytes of a file without an index, which is sorted in memory
 MOST_OF_FILE = 8192 * MIB  # bytes on the disk, of a file that is compressed whole
 DAMAGED = (ValueError, EOFError, zstd.ZstdError)  # raised for bytes that cannot be unpacked
 _PIECE = MIB
-_LONGEST_HEAD = 18  # bytes of a zstd frame
+_LONGEST_HEAD = 18  # bytes of the longest header of a zstd frame
 
 
 class LimitError(ValueError):

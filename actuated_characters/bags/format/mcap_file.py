@@ -32,17 +32,17 @@ from actuated_characters.bags.format.storage import (
 from msgs_config.errors import RecordingError
 
 _MAGIC = b"\x89MCAP0\r\n"
-_HEAD = struct.Struct("<BQ")  # of a record: its kind, and the length of its content
+_HEAD = struct.Struct("<BQ")  # a record's kind, and the length of its content
 _MESSAGE_HEAD = struct.Struct(
     "<HIQQ"
 )  # channel, number, log time, time of publishing; then the message
 _MESSAGE, _CHUNK = int(Opcode.MESSAGE), int(Opcode.CHUNK)
 _IN_CHUNK = {int(Opcode.SCHEMA), int(Opcode.CHANNEL), _MESSAGE}
-_ENDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # kinds with their lengths
-_UNKNOWN = range(max(Opcode) + 1, 0x80)  # kinds; those of other programs begin at 0x80
+_ENDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # a file's last records: kind, length
+_UNKNOWN = range(max(Opcode) + 1, 0x80)  # kinds that MCAP lacks; other programs' begin at 0x80
 _BEHIND_SUMMARY_CRC = 4 + len(_MAGIC)  # bytes from the checksum to the end
 _CUT_OFF = "bytes cut off"
-_MOST_NAMED = 5  # kinds of damage
+_MOST_NAMED = 5  # kinds of damage that a sentence names
 _LEAST_HELD = 200  # bytes that a message takes in memory beside its own
 
 
@@ -65,8 +65,8 @@ class McapFile:
         """Whether there was something compressed."""
         self._schemas: dict[int, Schema] = {}
         self._chunks: list[ChunkIndex] = []
-        self._count = 0  # of channels, as the statistics have it
-        self._names: Collection[str] | None = None  # of topics that are read; None: all
+        self._count = 0  # channels that the file's statistics count
+        self._names: Collection[str] | None = None  # topics that are read; None: all
 
     @property
     def damage(self) -> str:
@@ -105,7 +105,7 @@ class McapFile:
         if not isinstance(header, Header) or header.profile != "ros2":
             raise ValueError("its profile is not 'ros2'")
         self._read_summary(self._file)
-        if not self._is_indexed:  # then topics may be announced anywhere
+        if not self._is_indexed:  # without an index topics may be announced anywhere
             for _ in self.messages():
                 pass
 
@@ -216,7 +216,7 @@ class McapFile:
             schema.name,
             channel.message_encoding,
             schema.data.decode(errors="replace"),
-            channel.metadata.get(TYPE_HASH, ""),  # as rosbag2 writes it from Jazzy on
+            channel.metadata.get(TYPE_HASH, ""),  # rosbag2 writes it from Jazzy on
             channel.metadata.get(OFFERED_QOS, ""),
             channel.metadata.get(LOG_TIME) == SIMULATED,
         )
@@ -237,7 +237,7 @@ class McapFile:
         if not footer.summary_start:
             return
         file.seek(footer.summary_start)
-        if footer.summary_crc:  # of all up to the checksum itself
+        if footer.summary_crc:  # checksum of all bytes before it, from the summary on
             size = file.seek(-_BEHIND_SUMMARY_CRC, SEEK_END) - footer.summary_start
             limits.check_size("a summary", size, limits.MOST_OF_CHUNK)
             file.seek(footer.summary_start)

@@ -20,10 +20,10 @@ from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
 _OUTERMOST = "rosbag2_bagfile_information"
-BAG = "bag"  # in the directory of a run
-EARLIER_BAG = BAG + "-earlier"  # the older part, while a recording of bounded size is made
-FILE, MESSAGE = "file", "message"  # that rosbag2 compressed; MCAP's chunks tell themselves
-_LATEST_VERSION = 9  # of Jazzy
+BAG = "bag"  # name of the bag in a run's directory
+EARLIER_BAG = BAG + "-earlier"  # older part of the bag while a recording of bounded size is made
+FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; MCAP's chunks say so themselves
+_LATEST_VERSION = 9  # version that Jazzy writes
 
 
 class BagMetadata(NamedTuple):
@@ -47,7 +47,7 @@ def read_metadata(bag: Path) -> BagMetadata:
         raise RecordingError(f"no complete recording at {bag}: {_missing(bag)}") from error
     except RecordingError as error:
         raise RecordingError(f"cannot read recording {bag}: {error}") from error
-    except Exception as error:  # of a file that holds something else
+    except Exception as error:  # raised for a file that holds something else
         raise RecordingError(f"cannot read recording {bag}: {METADATA} is damaged") from error
     try:
         return _parse(bag, content)
@@ -88,7 +88,7 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
     others = {topic["serialization_format"] for topic in topics} - {CDR}
     mode = (content.get("compression_mode") or "").lower()  # rosbag2 writes it in capitals
     mode = "" if mode == "none" else mode
-    # `ros2 bag reindex` of Humble leaves it empty; the suffix of each file says it as well
+    # `ros2 bag reindex` of Humble leaves the storage empty; each file's suffix says it as well
     named = content["storage_identifier"] or storage_of(paths)
     found: dict[str, tuple[Any, Collection[str]]] = {
         "storage": (named, SUFFIXES),
@@ -100,7 +100,7 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
         if value not in choices:
             problem = one_of(what, value, [choice for choice in choices if choice])
             raise RecordingError(f"cannot read recording {bag}: {problem}")
-    present = tuple(bag / PurePath(path).name for path in paths)  # once relative to `bag`'s parent
+    present = tuple(bag / PurePath(path).name for path in paths)  # old paths include the bag's name
     return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
 
 _NS_PER_S = 10**9
-_FOREVER_NS = 2**63 - 1  # of rclpy's durations
+_FOREVER_NS = 2**63 - 1  # what rclpy has for a duration without end
 
 
 def offered_qos(offered: "Quality | QoSProfile") -> Qos:

@@ -6,29 +6,29 @@ MCAP, SQLITE3 = "mcap", "sqlite3"
 NONE, ZSTD = "none", "zstd"
 COMPRESSIONS = (NONE, ZSTD)
 SUFFIXES = {MCAP: ".mcap", SQLITE3: ".db3"}
-ZSTD_SUFFIX = ".zstd"  # of a file that is compressed as a whole
+ZSTD_SUFFIX = ".zstd"  # suffix of a file that is compressed as a whole
 FILE_SUFFIXES = (*SUFFIXES.values(), ZSTD_SUFFIX)
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"  # no message begins so: CDR begins with a zero
 CDR = "cdr"  # the only serialisation that ROS 2 has
-MOST_OF_METADATA = 1 << 22  # characters; of a hundred topics it has some 100,000
+MOST_OF_METADATA = 1 << 22  # characters; for a hundred topics it takes some 100,000
 LATEST_NS = 2**63 - 1  # rosbag2 holds times in int64
-ROS_DISTRO = "jazzy"  # that of the wheels
+ROS_DISTRO = "jazzy"  # the distribution of the wheels of ROS 2
 WALL, SIMULATED = "wall", "simulated"
 LOG_TIMES = (WALL, SIMULATED)
-LOG_TIME = "log_time"  # says which one, in the metadata of channels and in rosbag2's custom data
-OFFERED_QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"  # of rosbag2's channels
+LOG_TIME = "log_time"  # key in channels' metadata and rosbag2's custom data: WALL or SIMULATED
+OFFERED_QOS, TYPE_HASH = "offered_qos_profiles", "topic_type_hash"  # keys of a channel's metadata
 
 
 class StoredTopic(NamedTuple):
     """A topic as a file announces it."""
 
     name: str
-    type_name: str  # as "sensor_msgs/msg/JointState"
+    type_name: str  # such as "sensor_msgs/msg/JointState"
     serialization: str
     definition: str = ""
     type_hash: str = ""  # empty before Jazzy
     offered_qos: str = ""  # YAML, as rosbag2 writes it
-    has_simulated_log_time: bool = False  # else log times are of the wall clock
+    has_simulated_log_time: bool = False  # False: log times are of the wall clock
 
 
 class StoredMessage(NamedTuple):
@@ -36,10 +36,10 @@ class StoredMessage(NamedTuple):
 
     log_time_ns: int
     published_ns: int | None  # wall time; None where the storage does not have it
-    place: tuple[int, int]  # in the file
+    place: tuple[int, int]  # where the message is in the file
     topic: StoredTopic
-    raw: bytes  # as it is stored: rosbag2 may have compressed each
-    number: int = 0  # of its channel's messages; 0 if it has none
+    raw: bytes  # as it is stored: rosbag2 may have compressed each message
+    number: int = 0  # its number among its channel's messages; 0 if it has none
 
 
 def reason(error: Exception) -> str:

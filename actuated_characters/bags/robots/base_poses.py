@@ -22,8 +22,8 @@ _POSES = tuple(
     for name in ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Pose")
 )
 _WANTED = ("goal", "target", "cmd", "command", "desired", "setpoint", "initialpose")
-_MOST_FRAMES = 64  # from the base up to the world
-_LEAST_NORM = 1e-6  # of a quaternion
+_MOST_FRAMES = 64  # frames from the base up to the world
+_LEAST_NORM = 1e-6  # least norm of a quaternion that is taken for an orientation
 
 
 class Stamped(NamedTuple):
@@ -107,9 +107,9 @@ def _inside(outer: Pose, inner: Pose) -> Pose:
 class BaseMotion:
     """Where the base is, as a sum of tracks from the world to a frame that is fixed to it."""
 
-    source: str  # the topic
-    tracks: tuple[PoseTrack, ...]  # from the world on
-    frame: Pose  # of the last track's frame in the base
+    source: str  # the topic that the poses come from
+    tracks: tuple[PoseTrack, ...]  # in their order, the first one in the world
+    frame: Pose  # pose of the last track's frame in the base
     remark: str = ""
 
     def at(self, stamps_ns: IntArray, log_times_ns: IntArray) -> FloatArray:
@@ -197,7 +197,7 @@ def _of_topic(bag: Path, topic: str, kind: str, frames: Mapping[str, Pose]) -> B
         content = timed.content
         child = str(getattr(content, "child_frame_id", child))
         pose = content.transform if kind.endswith("TransformStamped") else content
-        while hasattr(pose, "pose"):  # beside a covariance, in a message that has a header
+        while hasattr(pose, "pose"):  # the pose is within: below a header, or beside a covariance
             pose = pose.pose
         _append(track, getattr(content, "header", None), timed, pose)
     if not track.poses:

@@ -12,7 +12,7 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.errors import RecordingError
 
-_MOST_BACK_NS = 1_000_000_000  # that stamps may go back where several nodes publish on one topic
+_MOST_BACK_NS = 1_000_000_000  # how far stamps may go back where several nodes publish on one topic
 _NAMES_SHOWN = 6
 _BEYOND_A_TURN = 1e-3  # rad: how far beyond -pi and pi an angle may be that was wrapped
 
@@ -103,7 +103,7 @@ class _Rows:
         """Add a message, not older than those before."""
         message, names = sample.timed.content, tuple(sample.timed.content.name)
         if len(message.position) != len(names):
-            self.uneven += bool(len(message.position))  # others may have efforts alone
+            self.uneven += bool(len(message.position))  # some have efforts, but no positions
             return
         columns, entries = self._place(names)
         again = bool(self._stamps) and self._stamps[-1][0] == sample.stamp_ns

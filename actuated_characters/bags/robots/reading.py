@@ -31,7 +31,7 @@ from msgs_config.geometry import rotations
 _TEXT = "std_msgs/msg/String"
 _DESCRIPTION = "robot_description"
 _USUAL = "joint_states"
-_LEFT_OUT = "left out"  # in a character's warnings that concern what is seen
+_LEFT_OUT = "left out"  # words in those of a character's warnings that concern what is seen
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RobotSource:
 
     character: str | None = None
     """Of this project's runs the name of one of several; else a robot's file, or a shipped name."""
-    topic: str | None = None  # of joint states
+    topic: str | None = None  # the topic of joint states
     base: str | None = None  # the topic that says where the base is, or `none`
 
 
@@ -52,7 +52,7 @@ class RobotRecording(Recording):
     robot did not publish are NaN. The effort of a tick is that of the state after it.
     """
 
-    topic: str = ""  # of its joint states
+    topic: str = ""  # the topic of its joint states
     remarks: tuple[str, ...] = ()  # what was left out, and where its base comes from
 
     @property

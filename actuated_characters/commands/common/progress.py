@@ -22,7 +22,7 @@ def progress_bar(
         TimeRemainingColumn(),
         console=console,
         transient=transient,
-        disable=transient and not console.is_interactive,  # else it would leave an empty line
+        disable=transient and not console.is_interactive,  # else the bar would leave an empty line
     )
     bar.add_task(description, total=total, state="")
     return bar

@@ -104,5 +104,7 @@ def add_loop(run: argparse.ArgumentParser) -> None:
         help="simulator and controller as two nodes of one process: the same states, sooner",
     )
     loop.add_argument(
-        "--in-process", action="store_true", help="one process without ROS: the same states, no bag"
+        "--in-process",
+        action="store_true",
+        help="all nodes in this process, without ROS: the same messages and bag, sooner",
     )

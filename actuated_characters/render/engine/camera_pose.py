@@ -10,7 +10,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Vector
 
-_MARGIN = 0.05  # of the extent of what is seen, that stays free around it
+_MARGIN = 0.05  # share of the extent of what is seen that stays free around it
 
 Size: TypeAlias = tuple[int, int]
 """Width and height of a picture in pixels."""

@@ -24,8 +24,8 @@ from msgs_config.arrays import BoolArray
 Picture: TypeAlias = NDArray[np.uint8]
 """Red, green and blue (h, w, 3), rows from top to bottom, columns from left to right."""
 
-_SHADOW = 0.72  # of the ground's brightness
-_SHADOW_SIZE = (384, 384)  # of the picture from the light
+_SHADOW = 0.72  # share of the ground's brightness that a shadow leaves
+_SHADOW_SIZE = (384, 384)  # pixels of the picture from the light
 
 
 class Compositor:
@@ -44,7 +44,7 @@ class Compositor:
         self._view, self._size, self._samples = view, size, samples
         self._fine_size = (width * samples, height * samples)
         self._colors: Samples = np.broadcast_to(ground.BACKGROUND, (height, width, 3)).copy()
-        # of what is solid, of each sample: distance from the camera along its axis, m
+        # for each sample, the distance of what is solid from the camera along its axis, m
         self._depth = np.full((height * samples, width * samples), np.inf, dtype=np.float32)
         if has_ground:
             self._colors = ground.colors(view, size)
@@ -65,7 +65,7 @@ class Compositor:
         width, height = _SHADOW_SIZE
         dark = scene.draw(light, _SHADOW_SIZE, PixelRegion(0, height, 0, width)).casts_shadow
         edges = np.array((0.0, 1.0))
-        x, y = ground.places(light, (1, 1), edges, edges)  # the corners of that picture
+        x, y = ground.places(light, (1, 1), edges, edges)  # corners of the picture from the light
         corners = np.column_stack((x.ravel(), y.ravel(), np.zeros(4)))
         box = self._view.box(Spheres(corners, np.zeros(4)), self._size)
         if box:

@@ -13,7 +13,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 
-_BELOW_GROUND = 0.1  # of its height, that a character may reach below the ground
+_BELOW_GROUND = 0.1  # share of its height that a character may reach below the ground
 
 Frames: TypeAlias = tuple[FloatArray, FloatArray]
 """Origins (links, 3) in m and orientations xyzw (links, 4) of link frames in the world."""
@@ -23,7 +23,7 @@ Frames: TypeAlias = tuple[FloatArray, FloatArray]
 class LinkForce:
     """A force to be shown as an arrow that ends where it leaves the air and meets a link."""
 
-    link: int  # among those of all characters
+    link: int  # row of the link among those of all characters
     point: FloatArray  # (3,) where it acts, m in the link frame
     arrow: FloatArray  # (3,) along the force in the world, of length one for the longest arrow
 
@@ -42,7 +42,7 @@ class PosedCharacters:
         self.shapes = [shapes for each in characters for shapes in drawn_shapes(each)]
         none = Spheres(np.empty((0, 3)), np.empty(0))
         self._around = [Spheres.joined([none, *map(outline, own)]) for own in self.shapes]
-        # of all links in their frames: spheres around the shapes, and the origins
+        # the spheres of all links in their frames: around the shapes, and the origins
         count = len(self.shapes)
         origins = Spheres(np.zeros((count, 3)), np.zeros(count))
         self._spheres = Spheres.joined([*self._around, origins])
@@ -77,7 +77,7 @@ class PosedCharacters:
             rest[number] = np.array(character.rest_position)
             lowest, highest = self.spheres(self.frames(np.concatenate(rest))).bounds(np.eye(3))
             below = lowest[2] < -_BELOW_GROUND * (highest[2] - lowest[2])
-            if below and not character.layout.has_floating_base:  # which goes where it can
+            if below and not character.layout.has_floating_base:  # a floating base does not hang
                 return False
         return True
 

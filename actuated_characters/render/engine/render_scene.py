@@ -23,12 +23,12 @@ from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.geometry.surface import Surface
 
-LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # from the light
+LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
 _NEAR_PLANE, _FAR_PLANE = (
     0.02,
     50.0,
-)  # of the view's distance: what is nearer or farther is not drawn
+)  # in view distances: what is nearer or farther is not drawn
 _LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
 _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
@@ -59,7 +59,7 @@ class RenderScene:
         self._links: list[tuple[int, int, Quadruple]] = []  # row of the link, body, colour
         self._balls: list[tuple[float, int]] = []  # radius, body
         self._arrows: list[int] = []  # bodies
-        self._terrain: tuple[int, Sequence[float], Sequence[float]] | None = None  # and its pose
+        self._terrain: tuple[int, Sequence[float], Sequence[float]] | None = None  # body and pose
         try:
             if terrain is not None:
                 self._add_terrain(terrain)
@@ -91,7 +91,7 @@ class RenderScene:
             else:
                 self._put(body, origin, turn_xyzw)
             red, green, blue, _ = colors[row] or own_color
-            self._paint(body, -1, (red, green, blue, 1.0))  # it draws nothing transparent
+            self._paint(body, -1, (red, green, blue, 1.0))  # the engine draws nothing transparent
 
     def show_terrain(self) -> None:
         """Show the terrain, if there is one."""
@@ -182,7 +182,7 @@ class RenderScene:
 
     def _add_body(self, color: Quadruple, **measures: object) -> int:
         kind = pybullet.GEOM_BOX if "halfExtents" in measures else pybullet.GEOM_MESH
-        with captured_output(), c_numbers():  # a mesh is a file, which it reads with the body
+        with captured_output(), c_numbers():  # the engine reads a mesh's file with the body
             seen = pybullet.createVisualShape(
                 kind, rgbaColor=color, **measures, physicsClientId=self._client
             )

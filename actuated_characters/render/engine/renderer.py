@@ -26,7 +26,7 @@ _NO_BALLS = np.zeros((0, 4))
 _MOST_DRAWN = 2**23  # samples of a picture; each takes some 40 bytes, and more while it is drawn
 _GHOST_COLOR, _GHOST_OPACITY = (0.25, 0.85, 0.45, 1.0), 0.45
 _MARK_COLOR = (0.55, 0.15, 0.75, 1.0)
-_ARROW_RADIUS, _HIDDEN_ARROW_OPACITY = 0.005, 0.55  # of the view's distance; and where hidden
+_ARROW_RADIUS, _HIDDEN_ARROW_OPACITY = 0.005, 0.55  # share of the view's distance, opacity
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class FrameSpec:
     """What one picture shows, of characters of n degrees of freedom and l links in all."""
 
     position: FloatArray  # (n,), message form
-    view: CameraPose = _DEFAULT_VIEW  # where from
+    view: CameraPose = _DEFAULT_VIEW  # where it is seen from
     ghost: FloatArray | None = None  # (n,): transparent copies; NaN for a character without one
     ghost_offset: Vector = (0.0, 0.0, 0.0)  # m, world: how far from its place a ghost is drawn
     forces: Sequence[LinkForce] = ()
-    arrow_length: float = 1.0  # m, of an arrow of length one
+    arrow_length: float = 1.0  # m, length of an arrow whose `LinkForce.arrow` has length one
     touching: BoolArray | None = None  # (l,): the links that are marked by a colour
     balls: FloatArray | None = None  # (m, 4): centres and radii, m in the world
-    caption: str = ""  # which `draw` adds
+    caption: str = ""  # text that `draw` adds
 
 
 class Renderer:

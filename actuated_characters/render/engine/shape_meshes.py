@@ -14,7 +14,7 @@ from msgs_config.extras import require_extra
 from msgs_config.geometry.surface import Surface
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
-_SIDES = np.array(  # corners of each, counterclockwise from outside
+_SIDES = np.array(  # corners of each side, counterclockwise from outside
     [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 )
 
@@ -64,7 +64,7 @@ def surface_of(shape: Shape) -> Surface:
 
 
 def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
-    vertices = read_vertices(path)  # which checks the file
+    vertices = read_vertices(path)  # checks the file as well
     if path.suffix.lower() != ".obj":
         return vertices, np.arange(len(vertices)).reshape(-1, 3)
     require_extra("meshes", f"mesh {path}, an .obj that is to be drawn,", CharacterError)
@@ -73,6 +73,6 @@ def _read_mesh(path: Path) -> tuple[FloatArray, IntArray]:
     try:
         mesh = trimesh.load_mesh(path, process=False, skip_materials=True)
         return np.array(mesh.vertices), np.array(mesh.faces)
-    except Exception as error:  # whatever a reader of others makes of a broken file
+    except Exception as error:  # trimesh raises anything for a broken file
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise CharacterError(f"mesh {path} cannot be drawn: {reason}") from error

@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.geometry.surface import Surface
 
-HEAD_WIDTH = 3.0  # of an arrow, in diameters of its shaft
+HEAD_WIDTH = 3.0  # width of an arrow's head, in diameters of its shaft
 
 _AROUND = 24  # faces around the axis
 _ALONG_ARC = 7  # points of a quarter of a circle
@@ -31,7 +31,7 @@ def round_surface(shape: Shape) -> Surface:
 def arrow_surface(length: float, radius: float) -> Surface:
     """The surface of an arrow from the origin along z; the radius is that of its shaft, in m."""
     wide = HEAD_WIDTH * radius
-    neck = length - min(2.0 * wide, 0.6 * length)  # where its head begins
+    neck = length - min(2.0 * wide, 0.6 * length)  # where the arrow's head begins
     return _polygon_revolved(
         [(0.0, 0.0), (radius, 0.0), (radius, neck), (wide, neck), (0.0, length)]
     )

@@ -18,7 +18,7 @@ from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
-_SHADE = 0.86  # of every second link along a branch
+_SHADE = 0.86  # brightness of every second link along a branch
 _BRANCH_COLORS = (
     (0.93, 0.82, 0.62),
     (0.96, 0.72, 0.66),

@@ -13,17 +13,17 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 
-_QUANTITIES = ("effort", "position", "velocity")  # a state's effort came before it
+_QUANTITIES = ("effort", "position", "velocity")  # by cause: a state's effort came before it
 
 
 @dataclass(frozen=True)
 class FirstDifference:
     """The first difference of two recordings."""
 
-    tick: int  # whose state it is
+    tick: int  # tick of the state that differs
     time: float  # s since the first state that both have
     quantity: str  # "effort" of the tick before, "position" or "velocity"
-    dof: str  # the one that differs most
+    dof: str  # the degree of freedom that differs most
     values: tuple[float, float]
     amount: float  # rad, m, ...; of rotations the difference is a rotation
     count: int  # degrees of freedom that differ in this quantity
@@ -51,13 +51,13 @@ class RecordingComparison:
     """The differences of two recordings of one character."""
 
     name: str
-    states: tuple[int, int]  # of each
+    states: tuple[int, int]  # states of each recording
     common: int  # states with the same stamps
     first: FirstDifference | None
     growth: Growth
-    metrics: dict[str, tuple[object, object]]  # without those that neither has
+    metrics: dict[str, tuple[object, object]]  # of both recordings, without those that neither has
     simulator: dict[str, tuple[object, object]]  # parameters that differ
-    controller: dict[str, tuple[object, object]] | None  # at the start; None: not in both
+    controller: dict[str, tuple[object, object]] | None  # those at the start; None: not in both
     versions: dict[str, tuple[object, object]]  # of package, engines and libraries that differ
 
     @property
@@ -141,7 +141,7 @@ def _first_difference(
             continue
         amounts = _amounts(recording, quantity, ours, theirs)
         if tolerance is not None:
-            differs &= ~(amounts <= tolerance * np.maximum(1.0, np.abs(ours)))  # NaN is not
+            differs &= ~(amounts <= tolerance * np.maximum(1.0, np.abs(ours)))  # NaN differs
         found = np.flatnonzero(differs.any(axis=1))
         if not len(found) or (earliest is not None and found[0] >= earliest[0]):
             continue

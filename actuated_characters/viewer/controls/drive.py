@@ -20,7 +20,7 @@ from msgs_config.bus.dds import create_publisher
 from msgs_config.bus.node import Publisher
 from msgs_config.messages import topics, typed
 
-_WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s, by keys
+_WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s that keys ask for
 _PERIOD = 0.1  # s between two velocities
 _FIRST_PRESS, _REPEATED_PRESS = (
     0.7,
@@ -79,7 +79,7 @@ class DrivingInput:
 
     velocity: Velocity = Velocity()
     until: float = -math.inf
-    key: Key | None = None  # the last one, and when
+    key: Key | None = None  # the key that was pressed last; `pressed` says when
     pressed: float = -math.inf
 
     def press(self, key: Key, now: float) -> "DrivingInput":
@@ -104,11 +104,11 @@ class DrivingControls:
     def __init__(self, node: Node, gui: viser.GuiApi, actions: ActionQueue) -> None:
         self._node, self._gui, self._actions = node, gui, actions
         self._below: str | None = None  # the namespace of the character that is driven, if any
-        self._publisher: Publisher | None = None  # of its topic
-        self._publishers: dict[str, Publisher] = {}  # of all that were driven, by their namespaces
+        self._publisher: Publisher | None = None  # publishes that character's velocity
+        self._publishers: dict[str, Publisher] = {}  # those of all driven characters, by namespace
         self._commands: list[viser.CommandHandle] = []
         self._input = DrivingInput()
-        self._moves = False  # the last velocity that was published is another one than zero
+        self._moves = False  # whether the last velocity that was published is not zero
         self._next_search = self._next_velocity = 0.0  # s
         self._folder = gui.add_folder("Drive", visible=False)
         with self._folder:
@@ -145,7 +145,7 @@ class DrivingControls:
         if self._publisher is None or now < self._next_velocity:
             return
         velocity = self._input.velocity if now < self._input.until else Velocity()
-        if self._moves or velocity != Velocity():  # of zeros only the first
+        if self._moves or velocity != Velocity():  # of several zeros only the first is sent
             self._publisher.publish(velocity.encode())
             self._next_velocity = now + _PERIOD
         self._moves = velocity != Velocity()

@@ -24,7 +24,7 @@ from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
 
 _SPRING = (230, 60, 20)
-_GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # what simulators have by default
+_GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # m/s^2, s: what simulators have by default
 
 
 class Hands:
@@ -116,7 +116,7 @@ class Hands:
             self.wrench_durations.get(simulator, began_with), 1.0 / known.parameters["rate"]
         )
         share = drag.share(stamp_ns, duration)
-        if share == 0.0:  # nothing has moved: it is paused
+        if share == 0.0:  # nothing has moved: the simulator is paused
             return
         drag.impulse += share * duration * drag.force
         wrench = np.concatenate((share * force, np.zeros(3)))

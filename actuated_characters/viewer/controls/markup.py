@@ -1,6 +1,6 @@
 """Text in the panel, whose language is Markdown."""
 
-_MAX_CHARACTERS = 300  # characters
+_MAX_CHARACTERS = 300  # characters of a sentence
 _MARKUP = str.maketrans({mark: f"\\{mark}" for mark in "\\`*_{}[]<>#|~$&"})
 
 

@@ -33,8 +33,8 @@ class Subject:
     """A character that the panel can be about."""
 
     character: str
-    simulator: str  # namespace, which begins with `/` or is empty
-    below: str  # its own namespace, likewise
+    simulator: str  # its namespace, which begins with `/` or is empty
+    below: str  # the character's own namespace, of the same form
     session: str
     parameters: Mapping[str, tuple[Shown, ...]] = field(default_factory=dict, compare=False)
     """That the panel has of its nodes, by the titles of folders."""
@@ -72,7 +72,7 @@ class Panel:
         """A callback of viser that has the node's thread call a function with a value."""
 
         async def change(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # else it is what this panel has set itself
+            if event.client_id is not None:  # without a client this panel has set it itself
                 self._actions.put(partial(function, value()))
 
         return change

@@ -20,8 +20,8 @@ class ParameterControls:
         self, gui: viser.GuiApi, requests: Requests, later: Later, tell: Callable[[str], None]
     ) -> None:
         self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
-        self._nodes: dict[str, str] = {}  # whole names by those in the contract
-        self._prefix = ""  # of the character's own parameters of its simulator
+        self._nodes: dict[str, str] = {}  # whole names of nodes by those in the contract
+        self._prefix = ""  # begins the names of the character's own parameters of its simulator
         self._shown: Mapping[str, tuple[Shown, ...]] = {}
         self._folders: dict[str, Any] = {}
         self._controls: dict[str, tuple[Shown, Any]] = {}  # by the parameter's name
@@ -38,7 +38,7 @@ class ParameterControls:
             self._shown = shown
             self._build()
         for _, handle in self._controls.values():
-            handle.visible = False  # until the node has said that it has it
+            handle.visible = False  # until the node has said that it has the parameter
         for folder in self._folders.values():
             folder.visible = False
         self._ask(self._controls)

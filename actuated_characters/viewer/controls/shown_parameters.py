@@ -25,7 +25,7 @@ class Shown:
     options: tuple[str, ...] = ()
     range: tuple[float, float, float] | None = None  # least, most, step
     has_no_limit: bool = False  # the slider's largest value stands for infinity
-    nodes: tuple[str, ...] = (CONTROLLER,)  # that have it; the first one's value is shown
+    nodes: tuple[str, ...] = (CONTROLLER,)  # nodes that have it; the first one's value is shown
     then: tuple[tuple[str, str, str], ...] = ()  # node, name, value: set when this one was taken
 
 

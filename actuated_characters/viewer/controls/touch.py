@@ -33,10 +33,10 @@ class Drag:
     """A point of a link that is held by the pointer."""
 
     below: str  # the namespace of the character
-    row: int  # of the link
+    row: int  # row of the link
     grabbed: FloatArray  # (3,) m, in the link's frame
     pointer: FloatArray  # (3,) m, as the browser has it
-    stamp_ns: int | None = None  # of the state in which the last push was sent
+    stamp_ns: int | None = None  # stamp of the state in which the last push was sent
     force: float = 0.0  # N, the present one
     impulse: float = 0.0  # N s, since it began
 

@@ -20,14 +20,14 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
 _STRAINED = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
-_LEVELS = 12  # of colours, so that few change from frame to frame
+_LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
 _GHOST = (90, 120, 220)
 _GHOST_OPACITY = 0.25
 _CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
-_METRES_A_WEIGHT = 0.5  # of an arrow: the length that stands for the character's own weight
+_METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
 _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
-_MIN_ARROW_SHARE = 1e-3  # of the weight, that an arrow shows
-_ABOVE_GROUND = 0.004  # m, of what is drawn on it
+_MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least
+_ABOVE_GROUND = 0.004  # m, height of what is drawn on the ground
 _GRAVITY = 9.81
 
 SHOWN = {

@@ -18,8 +18,8 @@ from msgs_config.messages.throw import ProjectileThrow
 
 WORLD = "/world"
 
-_BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # m
-_CATCH_UP = 4.0  # 1/s: how soon the world follows
+_BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # colour; m
+_CATCH_UP = 4.0  # 1/s: how soon the world follows the characters
 _JUMP = 3.0  # m: a distance that is not caught up with but jumped
 BACKGROUND = (237, 242, 250)
 EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)

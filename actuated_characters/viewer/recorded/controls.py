@@ -66,7 +66,7 @@ class RecordedPanel:
         """Have the player's thread call a function with a control's value when a client sets it."""
 
         async def change(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # else it is what this panel has set itself
+            if event.client_id is not None:  # without a client this panel has set it itself
                 self._actions.put(partial(act, handle.value))
 
         (handle.on_click if click else handle.on_update)(change)

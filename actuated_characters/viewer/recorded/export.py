@@ -16,7 +16,7 @@ from actuated_characters.viewer.web.server import ViewerServer
 from msgs_config.errors import RecordingError
 from msgs_config.whole_files import write_whole
 
-FPS = 30  # of films
+FPS = 30  # pictures a second of films
 
 _PATIENCE = 30.0  # s that a browser may take for a picture
 

@@ -11,7 +11,7 @@ from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.viewer.recorded.export import free_path
 
 _MODULE = "actuated_characters.cli"
-_PATIENCE = 10.0  # s for a good end
+_PATIENCE = 10.0  # s in which a fork can end in good order
 
 
 class Fork:

@@ -25,7 +25,7 @@ from actuated_characters.viewer.web.rejections import Rejections
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
-_LEAST_REST = 0.003  # s a picture, for the threads that send it
+_LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
 
 
 class RecordedPlayer:

@@ -13,9 +13,9 @@ from actuated_characters.metrics.recording_metrics import contact_series, tracki
 from actuated_characters.report.decimation import span_maxima, span_starts
 from msgs_config.arrays import FloatArray
 
-_SPANS = 600  # of the time: more are not seen on a panel
+_SPANS = 600  # parts of the time: more of them are not seen on a panel
 _ASPECT = 2.6
-_MIN_HEIGHT = 1e-3  # that the height of a plot stands for
+_MIN_HEIGHT = 1e-3  # least value that the height of a plot stands for
 _COLOUR, _CURSOR = "#2a6fbb", "#d9480f"
 _ERROR, _EFFORT, _CONTACT = "largest joint error (rad)", "largest effort / limit", "force / weight"
 

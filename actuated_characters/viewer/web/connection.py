@@ -10,7 +10,7 @@ from websockets.frames import CloseCode
 
 MOST_BYTES = 1 << 16
 """Of a control message; the page's own have at most some hundreds."""
-_MOST_PICTURE_BYTES = 1 << 25  # of a message with a picture: a PNG of the page's window
+_MOST_PICTURE_BYTES = 1 << 25  # bytes of a message with a picture: a PNG of the page's window
 _RATE, _BURST = 500.0, 500.0  # messages a second, and at once; a page sends at most some 200
 _UNUSABLE_CODES = (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA, CloseCode.MESSAGE_TOO_BIG)
 
@@ -34,7 +34,7 @@ class CheckedConnection(ServerConnection):
         """`gate` checks the messages; the rest is the base class's."""
         super().__init__(*arguments, **options)
         self._gate = gate
-        self._allowance, self._looked_at = _BURST, 0.0  # messages, s
+        self._allowance, self._looked_at = _BURST, 0.0  # messages that may still come, s
         self._awaits_picture = False
 
     async def await_picture(self, *, awaits: bool) -> None:

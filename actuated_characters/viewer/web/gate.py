@@ -17,7 +17,7 @@ from actuated_characters.viewer.web.request_check import RequestCheck
 
 _PROTOCOL = f"viser-v{viser.__version__}"
 _MOST_TARGET = 2000  # characters of a path and its query; browsers send no more
-_MOST_SEGMENT = 255  # of a file's name
+_MOST_SEGMENT = 255  # characters of a file's name
 
 # viser's page is one file with scripts and styles within, decompresses itself (WebAssembly, whose
 # glue evaluates text), keeps pictures and workers in blobs and data, and talks to its own server.
@@ -62,7 +62,7 @@ class ServerGate:
 
     def options(self, process_request: Serve) -> dict[str, Any]:
         """Options of `websockets.asyncio.server.serve` by which it uses this gate."""
-        logger = logging.Logger(__name__)  # one of its own: viser adds filters to it
+        logger = logging.Logger(__name__)  # a logger of its own: viser adds filters to it
         logger.addHandler(_Told(self.reject))
         return {
             "process_request": partial(self._process, process_request),
@@ -73,7 +73,7 @@ class ServerGate:
 
     def message_fault(self, raw: bytes | str, *, awaits_picture: bool) -> str | None:
         """The reason to drop a message, None if there is none."""
-        assert self._messages is not None  # no connection was made before
+        assert self._messages is not None  # no connection is made before `open`
         return self._messages.find_fault(raw, awaits_picture=awaits_picture)
 
     def handle_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -114,7 +114,7 @@ class ServerGate:
             return respond(HTTPStatus.BAD_REQUEST, f"this server speaks {_PROTOCOL}\n")
         try:
             return serve(connection, request)
-        except Exception as error:  # a request that viser does not understand ends nothing
+        except Exception as error:  # a request that viser does not understand ends no connection
             self.reject(f"rejected a request: {error!r}")
             return respond(HTTPStatus.BAD_REQUEST, "this request is not understood\n")
 

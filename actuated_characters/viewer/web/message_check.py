@@ -20,7 +20,7 @@ _MOST_PIXELS = 1 << 14  # of a window's width or height
 _MOST_AREA = 1 << 25  # pixels of a picture: a small file may have very many
 _FARTHEST = 1e6  # m, or pixels: what is farther comes from no mouse
 _SLIDER_ROUNDING = 1e-9  # by which a page's slider may miss its own end
-_UNIT_TOLERANCE = 1e-3  # of the length of a direction
+_UNIT_TOLERANCE = 1e-3  # by which the length of a direction may differ from one
 _MAX_SHOWN = 60  # characters of a value that a line shows
 _PNG_HEAD = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 

@@ -4,7 +4,7 @@ from collections import deque
 
 _MOST_WAITING = 100  # sentences between two looks
 _MOST_TOLD = 100  # different sentences: a hostile sender must not fill memory and log
-_MAX_CHARACTERS = 300  # characters
+_MAX_CHARACTERS = 300  # characters of a sentence
 
 
 class Rejections:

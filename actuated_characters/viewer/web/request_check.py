@@ -15,7 +15,7 @@ LOOPBACK = "127.0.0.1"
 
 _LOCAL = "localhost"
 _SCHEMES = ("http", "https")
-_SOURCES = ("websocket", "playbackPath")  # that viser's page takes from its address
+_SOURCES = ("websocket", "playbackPath")  # what viser's page takes from the query of its address
 _SCHEMES_OF_SOURCES = ("http", "https", "ws", "wss")
 _MAX_SHOWN = 100  # characters of a header that a line shows
 

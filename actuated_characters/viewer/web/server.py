@@ -24,7 +24,7 @@ from msgs_config.errors import ConfigurationError, RecordingError
 
 FIRST_PORT = 8080
 
-_PORTS = 100  # that are tried
+_PORTS = 100  # ports that are tried
 _PATIENCE = 10.0  # s for a page to respond to a ping
 
 

@@ -36,7 +36,7 @@ class RootTarget:
     pitch: float = 0.0  # rad, ahead
     climb: float = 0.0  # m/s, upwards
     thrust: float = 0.0  # N, upwards, beside what height and climb need
-    arrival: float = 0.0  # share of `duration` after which it has both; 0: by `height_gains`
+    arrival: float = 0.0  # share of `duration` until it has height and climb; 0: by `height_gains`
     height_gains: Gains = (120.0, 22.0)
     tilt_gains: Gains = (150.0, 25.0)
     turn_gains: Gains = (60.0, 16.0)
@@ -48,9 +48,9 @@ class PressureTarget:
 
     ahead: float = 0.0  # m
     outward: float = 0.0  # m
-    share: float = 0.5  # where both feet stand: from the stance foot to the other one
+    share: float = 0.5  # of the way from the stance foot to the other one, where both stand
     gain: float = 1.5  # m for each m that the extrapolated centre of mass is off its course, ahead
-    side_gain: float = 1.5  # likewise, sideways
+    side_gain: float = 1.5  # m for each m that it is off its course sideways
     speed_gain: float = 0.0  # m for each m/s that the body is too fast
 
 
@@ -58,24 +58,24 @@ class PressureTarget:
 class Placement:
     """Where a foot goes, by a law of balance, and how."""
 
-    law: str = "extrapolated"  # or neutral, pendulum
+    law: str = "extrapolated"  # one of `laws.PLACEMENT_LAWS`
     width: float = 0.2  # m, of a step
     pace: float = 1.0  # the speed ahead that laws are told, as a share of the commanded one
     ahead: float = 0.0  # m, beside what the law says
-    gain: float = 0.0  # s, of the law neutral
-    fixed: float = 0.7  # share of `duration` after which the place ahead is what it is
+    gain: float = 0.0  # s, for the law neutral
+    fixed: float = 0.7  # share of `duration` after which the place ahead stays as it is
     clearance: float = 0.08  # m, of the foot at the middle of its way
-    depth: float = 0.0  # m, below the other sole, where its way ends
-    descent: float = 0.25  # m/s, at which it then goes on
+    depth: float = 0.0  # m, below the other sole, where the foot's way ends
+    descent: float = 0.25  # m/s, at which the foot goes on downwards after `duration`
     least_width: float = 0.1  # m, between the soles
     most_width: float = 0.6  # m
     most_ahead: float = 0.75  # m
     most_behind: float = 0.6  # m
     length: float = 0.0  # m, of a leg that reaches, from hip to sole
-    origin: str = HIP  # or centre, of mass: what a leg that reaches goes ahead of
+    origin: str = HIP  # HIP or CENTRE (of mass): what a leg that reaches goes ahead of
     carry: float = 0.0  # the share of its velocity that a leg that reaches sets out with
     retract: float = 0.0  # the share of the body's speed at which it goes back as it lands
-    stance_time: float = 0.0  # s, that it will stand, of the law neutral; 0: the state's duration
+    stance_time: float = 0.0  # s that it will stand, for the law neutral; 0: the state's duration
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class End:
 
     then: str
     conditions: tuple[Condition, ...]
-    swap: bool = False  # the roles of the sides
+    swap: bool = False  # whether the sides swap their roles
 
     @property
     def takes_time(self) -> bool:
@@ -165,7 +165,7 @@ class State:
     placement: Placement
     targets: tuple[JointTarget, ...]
     gains: dict[str, Gains]  # by joint as in `targets`
-    efforts: dict[str, str | tuple[float, ...]]  # by joint likewise: `BALANCE`, or N m
+    efforts: dict[str, str | tuple[float, ...]]  # by joint as in `targets`: `BALANCE`, or N m
     bounds: Bounds
     ends: tuple[End, ...]
     tracks: bool = False  # by the control law and its gains, not by inverse dynamics

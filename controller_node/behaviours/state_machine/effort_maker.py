@@ -41,8 +41,8 @@ from msgs_config.geometry.scalars import (
 )
 
 _SWIVEL = (10.0, 0.5)  # N m/rad and N m s/rad: keeps the knee of a leg that stands above its foot
-_LEVEL = (80.0, 0.8)  # likewise, keeps its sole on the ground
-_MIN_ARRIVAL = 0.015  # s, of an arrival at least: errors are not made good within a tick
+_LEVEL = (80.0, 0.8)  # N m/rad and N m s/rad: keeps the sole of a leg that stands level
+_MIN_ARRIVAL = 0.015  # s until an arrival, at least: errors are not made good within a tick
 _LEFT = (0.0, 1.0, 0.0)
 
 

@@ -48,8 +48,8 @@ _STATE_KEYS = [
 ]
 _FILES = (".yaml", ".yml")
 _NEVER = "never"
-_PARTS = ("hip", "knee", "ankle")  # that every side has
-_DEPTH = 8  # of files that include others
+_PARTS = ("hip", "knee", "ankle")  # parts that every side has
+_DEPTH = 8  # the most files that include each other in a row
 
 
 def shipped_machines() -> list[str]:

@@ -34,7 +34,7 @@ _NARROW = 1e-3  # m, between feet that stand in one place
 _IN_BENDS = 0.6
 """Of `turn v / w^2`, by which a foot that reaches lands outward of a bend: the ground's force is
 to turn the velocity with the heading. Tried: with 0 a run drifts outward, with 1 inward."""
-_LEAST_SHARE = 0.03  # of the load, on each of two feet
+_LEAST_SHARE = 0.03  # least share of the load on each of two feet
 
 
 def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) -> list[Contact]:

@@ -28,7 +28,7 @@ from msgs_config.geometry.scalars import (
     subtract,
 )
 
-_STRAIGHT = 1e-3  # m, from the line of hip and ankle, of a knee at angle 0
+_STRAIGHT = 1e-3  # m, at most, of knee and ankle from the vertical through the hip at angle 0
 _BENT = 0.05  # rad, of the knee at least: a straight leg has no direction to bend
 _FOLDED = 2.4  # rad, of the knee at most
 
@@ -57,11 +57,11 @@ class Leg:
     ankle_entries: slice
     thigh_link: int
     foot_link: int
-    foot_inertia: float  # kg m^2, the least
+    foot_inertia: float  # kg m^2, the least about an axis through the ankle
     hip_in_root: Vector  # m, at rest
     thigh_length: float  # m
     shin_length: float  # m
-    knee_sign: float  # of the knee's angle where the shin goes backwards
+    knee_sign: float  # 1 or -1: sign of the knee's angle where the shin goes backwards
     upright: tuple[Quaternion, Quaternion, Quaternion]  # thigh, shin, foot, in world
     fixed: tuple[Quaternion, Quaternion]  # of hip and ankle, child in parent, at angle 0
     sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame

@@ -80,12 +80,12 @@ class StateMachine:
         sides = list(kit.machine.sides)
         self._stance, self._swing = sides[0], sides[1]
         self._state = kit.machine.states[kit.machine.start]
-        self._since = 0.0  # s
+        self._since = 0.0  # s, time at which the state began
         self._entered = False
         self._course = _STANDING
         self._feet: dict[str, SwingFoot] = {}  # by role
-        self._reaching: dict[str, ReachingFoot] = {}  # likewise
-        self._goal: tuple[float, float] | None = None  # of a foot that steps
+        self._reaching: dict[str, ReachingFoot] = {}  # by role
+        self._goal: tuple[float, float] | None = None  # m, where a foot that steps lands
         self._target = PoseTarget(kit.layout)
         self._last: tuple[FloatArray, float] | None = None  # targets and height of the last tick
         self._none = np.zeros(kit.layout.size)
@@ -141,7 +141,7 @@ class StateMachine:
 
     def _enter(self, state: State, now: float, at: Situation) -> None:
         self._state, self._since, self._entered = state, now, True
-        # what a blend comes over from
+        # The targets and the height that a blend comes over from.
         self._before = self._last or (at.body.position, at.body.root[2] - self._ground(at))
         sides = {STANCE: self._stance, SWING: self._swing}
         self._feet, self._goal = {}, None

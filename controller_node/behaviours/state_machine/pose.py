@@ -42,7 +42,7 @@ class _Joint:
     parent: int
     upright: Quaternion  # the child link's orientation where the character stands
     fixed: Quaternion  # of the child in its parent at angle 0
-    mirror: float  # of a hinge's angle, on the other side
+    mirror: float  # 1 or -1: sign of a hinge's angle on the other side
 
     def mirrored(self, value: Vector) -> Vector:
         """A rotation vector in joint axes, on the other side of the body."""
@@ -67,7 +67,8 @@ class PoseMaker:
         character: Character,
         machine: Machine,
         legs: Mapping[str, Leg],
-        upright: list[Quaternion],  # of each link of a standing character that faces along x
+        # The orientation of each link of a character that stands and faces along x.
+        upright: list[Quaternion],
         period: float,  # s
     ) -> None:
         self._layout: JointLayout = character.layout

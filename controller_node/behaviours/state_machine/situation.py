@@ -12,8 +12,8 @@ from controller_node.references.steering.reference import Course
 from msgs_config.geometry.scalars import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
-_STEADY = 0.6  # of a sole, from its middle, that bears a body that stands
-_MAX_PREDICTED = 4.0  # units of the pendulum's time, that it is predicted
+_STEADY = 0.6  # share of a sole, from its middle, that bears a body that stands
+_MAX_PREDICTED = 4.0  # units of the pendulum's time for which it is predicted at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,11 @@ class Situation:
 
     body: Body
     course: Course
-    stance: str  # side
+    stance: str  # side of the stance foot
     swing: str
     mirror: float  # 1 where the swing foot is the left one, else -1
     rate: float  # 1/s, of the inverted pendulum
-    centre: Vector  # of mass
+    centre: Vector  # m, the centre of mass
     velocity: Vector  # m/s, of the centre of mass
     other: Vector  # the swing sole
 

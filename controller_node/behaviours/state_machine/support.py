@@ -40,7 +40,7 @@ class Contact:
 
     side: str
     leg: Leg
-    share: float  # of 1
+    share: float  # of the load; those of all feet add up to 1
     pressure: Vector  # m, world
 
 
@@ -106,8 +106,8 @@ def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[
 
 def support_effort(
     model: DynamicsModel,
-    acceleration: FloatArray,  # (n,) wanted; of the root none horizontally
-    contacts: Sequence[Contact],  # whose shares are 1 together
+    acceleration: FloatArray,  # (n,) that is wanted; horizontally the root's does not count
+    contacts: Sequence[Contact],  # their shares add up to 1
     bounds: Bounds,
     root: tuple[Vector, Quaternion],  # its place in m, and its orientation
 ) -> FloatArray:

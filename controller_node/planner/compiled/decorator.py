@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")  # its elementary functions are its own
+os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")  # SVML has its own elementary functions
 
 import numba
 
@@ -18,7 +18,7 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
 SOURCES = (
     *_HERE.glob("*.py"),
-    Path(offsets.__file__),  # which functions come from: a test compares
+    Path(offsets.__file__),  # compiled functions come from here; a test compares
     Path(scalars.__file__),
 )
 """All files with functions that are compiled here."""
@@ -26,7 +26,7 @@ SOURCES = (
 
 def compiled(function: _Function) -> _Function:
     """Compile a function; a division by zero gives infinity or NaN, as in arrays."""
-    given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(_CACHE)  # read as it decorates
+    given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(_CACHE)  # read as numba decorates
     try:
         made = numba.njit(nogil=True, cache=True, error_model="numpy", fastmath=False)(function)
     finally:

@@ -15,7 +15,7 @@ from msgs_config.arrays import FloatArray, IntArray
 class Watched(NamedTuple):
     """What the features are made of."""
 
-    end_effectors: IntArray  # (k,) of MuJoCo's bodies
+    end_effectors: IntArray  # (k,) MuJoCo's numbers of these bodies
     mass: float  # kg
 
 

@@ -16,8 +16,8 @@ from msgs_config.arrays import FloatArray, IntArray
 class Joints(NamedTuple):
     """Where the joints but the floating base are in MuJoCo's positions and velocities."""
 
-    ball_positions: IntArray  # (k,) of quaternions
-    ball_velocities: IntArray  # (k,)
+    ball_positions: IntArray  # (k,) where each ball joint's quaternion begins
+    ball_velocities: IntArray  # (k,) where its angular velocity begins
     scalar_positions: IntArray  # (h,) of hinges and sliders
     scalar_velocities: IntArray  # (h,)
 
@@ -41,7 +41,7 @@ class Room(NamedTuple):
     known: FloatArray  # (n,)
     force: FloatArray  # (n,)
     acceleration: FloatArray  # (n,)
-    implicit: MassMatrix  # with the law's damping over a period
+    implicit: MassMatrix  # mass matrix with the law's damping over a period
 
 
 @compiled

@@ -14,9 +14,9 @@ from msgs_config.arrays import FloatArray, IntArray
 class Tree(NamedTuple):
     """Where the entries of a mass matrix are."""
 
-    starts: IntArray  # (n,) of each row among the entries
-    lengths: IntArray  # (n,) of each row
-    columns: IntArray  # (e,) of each entry
+    starts: IntArray  # (n,) where each row begins among the entries
+    lengths: IntArray  # (n,) number of entries in each row
+    columns: IntArray  # (e,) the column of each entry
 
 
 class MassMatrix(NamedTuple):

@@ -34,8 +34,8 @@ class EngineBuffers(NamedTuple):
     warm_start: FloatArray  # (n,)
     applied: FloatArray  # (n,) forces
     bias: FloatArray  # (n,)
-    mass: MassMatrix  # of the state
-    law_mass: MassMatrix  # what the law makes of it
+    mass: MassMatrix  # the mass matrix of the state
+    law_mass: MassMatrix  # the mass matrix with the law's damping over a period
     points: FloatArray  # (bodies, 3) m, origins of the links
     centres: FloatArray  # (bodies, 3) m, centres of mass of what each body carries
 
@@ -53,9 +53,9 @@ class RolloutModel(NamedTuple):
 class Desired(NamedTuple):
     """The reference over the horizon, and how the offsets are laid over it."""
 
-    first_tick: int  # of the horizon, since the episode began
+    first_tick: int  # the horizon's first tick, since the episode began
     knot_ticks: int  # from one knot to the next
-    first_knot: int  # number of the first of the knots that are given
+    first_knot: int  # number of the first knot that is given
     check_ticks: int  # from one check to the next
     positions: FloatArray  # (ticks + 1, q) as MuJoCo has them
     velocities: FloatArray  # (ticks + 1, n)

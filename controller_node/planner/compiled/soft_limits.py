@@ -44,7 +44,7 @@ class PassedBounds(NamedTuple):
     rows: FloatArray  # (m, n) of J, outwards
     explicit: FloatArray  # (m,) N m, the force if nothing yielded
     implicit: FloatArray  # (m,) N m s^2/rad, what each rad/s^2 of yielding takes away of it
-    coupling: FloatArray  # (m, m) of the implicit share and A
+    coupling: FloatArray  # (m, m) the implicit share times A
     system: FloatArray  # (m, m + 1)
     forces: FloatArray  # (m,) N m
     pushing: BoolArray  # (m,)

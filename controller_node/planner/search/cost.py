@@ -9,9 +9,9 @@ from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
-_STEP_TIME = 0.2  # s of its velocity by which a foot is ahead of a centre of mass that was pushed
-_STEP = 5.0  # 1/m, of a foot that steps there
-_LOOSE_CENTRE = 0.4  # of the weight of the centre of mass, horizontally, while the place gives way
+_STEP_TIME = 0.2  # s: feet go ahead of a pushed centre of mass by this times its velocity
+_STEP = 5.0  # 1/m, the weight of a foot that steps to there
+_LOOSE_CENTRE = 0.4  # share of the centre of mass's horizontal weight while the place gives way
 
 
 class ResidualModel:

@@ -19,11 +19,11 @@ from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
-_FIRST_ROUNDS = 6  # of the first plan: nothing has moved yet
+_FIRST_ROUNDS = 6  # rounds for the first plan: nothing has moved yet
 _WIDE_FACTOR = 2.5  # every other round looks so much farther: it may find another way out
-_MORE = 3  # times the samples, in the rounds after the first
-_MAX_OFFSET = 0.9  # sigma, of an offset
-_PENALTY = 0.2  # of an offset, for each sigma
+_MORE = 3  # times as many samples in the rounds after the first
+_MAX_OFFSET = 0.9  # sigma, the largest offset
+_PENALTY = 0.2  # residual of an offset, for each sigma
 _FEWEST_DRAWS = 6
 
 
@@ -31,13 +31,13 @@ _FEWEST_DRAWS = 6
 class Start:
     """Where a plan begins, in the world of the reference, and what is to be followed from there."""
 
-    seen: int  # tick of the state from which that is known
-    position: FloatArray  # (q,) MuJoCo's
+    seen: int  # tick of the state that the plan is sought from
+    position: FloatArray  # (q,) as MuJoCo has it
     velocity: FloatArray  # (n,)
     desired: Foreseen
     body: RolloutModel
     anchor: Anchor
-    perturbed: bool  # the feet go where they catch it
+    perturbed: bool  # whether the character is: then its feet go where they catch it
 
 
 class PlanSearch:
@@ -52,7 +52,7 @@ class PlanSearch:
     ) -> None:
         self._rollouts, self._residual_model = rollouts, residual_model
         self._settings, self._rate_hz = settings, rate_hz
-        self._unit = settings.noise * settings.sigma  # (n - 6,) of what is looked for
+        self._unit = settings.noise * settings.sigma  # (n - 6,) rad or m: the unit of x
 
     def find(self, start: Start, old: Plan | None, seed: tuple[int, int]) -> Plan:
         """A plan from a state, sought around what is left of an old one.

@@ -19,7 +19,7 @@ from controller_node.planner.contact_model import ContactModel
 from controller_node.references.offsets import Offsets, knot_before
 from msgs_config.arrays import BoolArray, FloatArray
 
-_MAX_FEATURE = 1e4  # of a feature; beyond, a rollout has come to nothing
+_MAX_FEATURE = 1e4  # the largest feature; beyond it a rollout has come to nothing
 
 
 class RolloutPool:
@@ -28,7 +28,7 @@ class RolloutPool:
     def __init__(self, model: ContactModel, workers: int) -> None:
         """The thread that asks is one of the workers."""
         self._model = model
-        self._own = model.engine()  # of the thread that asks for single states
+        self._own = model.engine()  # for single states, of the thread that asks for them
         self._engines = [model.engine() for _ in range(workers)]
         self._threads = ThreadPoolExecutor(max(workers - 1, 1))
 
@@ -87,7 +87,7 @@ class RolloutPool:
         for done in futures:
             done.result()
         with np.errstate(invalid="ignore"):
-            sound &= (np.abs(features) < _MAX_FEATURE).all(axis=(1, 2))  # NaN is not
+            sound &= (np.abs(features) < _MAX_FEATURE).all(axis=(1, 2))  # NaN is not sound
         features[~sound] = 0.0
         return features, sound
 

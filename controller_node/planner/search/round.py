@@ -11,7 +11,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 _DAMPINGS = (3.0, 0.3)  # lambda of the steps
-_KEPT = 0.9  # of the samples; the worst say little of where it is good
+_KEPT = 0.9  # share of the samples; the worst say little of where costs are low
 _FEWEST = 4  # samples that a step can be found from
 
 
@@ -24,7 +24,7 @@ class LeastSquaresProblem:
     residuals: Callable[[FloatArray], FloatArray]
     """Of deviations (s, m) the residuals (s, m); linear."""
     penalty: float
-    largest: float  # of each entry of x
+    largest: float  # the largest size of an entry of x
 
 
 @dataclass(frozen=True)

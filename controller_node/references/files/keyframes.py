@@ -31,7 +31,7 @@ class Keyframes:
 
     times: FloatArray  # (p,) s, rising
     configurations: GeneralizedPosition  # (p, n), (p, k, 4)
-    smooth: bool  # else linear
+    smooth: bool  # else the path is linear
     period: float | None = None  # s, of a loop
 
 
@@ -159,7 +159,7 @@ def _configurations(character: Character, positions: FloatArray) -> GeneralizedP
 
 def _number(what: str, value: Any, minimum: float = -LARGEST_NUMBER) -> float:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if is_number and minimum <= value <= LARGEST_NUMBER:  # NaN is not
+    if is_number and minimum <= value <= LARGEST_NUMBER:  # NaN is not within
         return float(value)
     raise _wrong(what, value, f"a number from {minimum:g} to {LARGEST_NUMBER:g}")
 

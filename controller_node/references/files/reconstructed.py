@@ -33,7 +33,7 @@ class FoundWith:
 
     duration: float  # s, as far as it was found
     simulator: Mapping[str, object]  # parameters of `sim_node`, by name
-    controller: Mapping[str, object]  # of `controller_node`
+    controller: Mapping[str, object]  # parameters of `controller_node`, by name
     pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which came in the search, too
 
 
@@ -111,5 +111,5 @@ def _check_part(place: str, part: Offsets, first: int, then: int, width: int) ->
             f"{place} offsets are {part.rows.shape} from knot {part.first_knot} on; they must be "
             f"{shape} from knot {begins} on"
         )
-    if not (np.abs(part.rows) <= _LARGEST_OFFSET).all():  # NaN is not
+    if not (np.abs(part.rows) <= _LARGEST_OFFSET).all():  # NaN is not within
         raise ClipError(f"{place} an offset is not finite, or over {_LARGEST_OFFSET:g}")

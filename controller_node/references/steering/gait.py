@@ -18,9 +18,9 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order, rotations
 
-_ROWS = 96  # of a cycle
+_ROWS = 96  # steps of phase in a cycle
 _LEAST_SPEED = 0.05  # m/s
-_MOST_TURN = 0.5  # rad a cycle; it is taken out
+_MOST_TURN = 0.5  # rad a cycle, at most; the turn is taken out
 
 
 @dataclass(frozen=True)

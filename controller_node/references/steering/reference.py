@@ -23,8 +23,8 @@ from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MOST_WAITING = 1000  # commands
-_LEANS_IN = 0.15  # s, time constant
-_LEANS_AHEAD = 0.5  # of what it should: the foot in front and the one behind are not on the ground
+_LEANS_IN = 0.15  # s, time constant of the lean
+_LEANS_AHEAD = 0.5  # share of the full lean ahead: feet in front and behind are off the ground
 _GRAVITY = 9.81  # m/s^2
 
 

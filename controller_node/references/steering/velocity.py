@@ -27,7 +27,7 @@ class VelocityRegion:
     ahead: float = math.inf  # m/s
     back: float = math.inf  # m/s
     aside: float = math.inf  # m/s, to either side
-    turn: float = math.inf  # rad/s, likewise
+    turn: float = math.inf  # rad/s, to either side
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def _check_obj_once(raw: bytes) -> None:
 
 def _check_obj(text: str) -> None:
     counts = dict.fromkeys(_OBJ_LISTS, 0)
-    # as the engine has it: Python's own splitting knows more characters that part and end
+    # Split as the engine does: Python's own splitting knows more separators and ends of lines.
     for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > MAX_LINE:
             raise ValueError(f"line {number} is longer than {MAX_LINE}")
@@ -83,6 +83,6 @@ def _check_face(number: int, corners: list[str], counts: dict[str, int]) -> None
         if not _OBJ_CORNER.fullmatch(corner):
             raise ValueError(f"line {number} is no face")
         for name, index in zip(_OBJ_LISTS, corner.split("/"), strict=False):
-            # counted from 1, or back from the last so far
+            # An index counts from 1, or back from the last one so far.
             if index and not 1 <= abs(int(index)) <= counts[name]:
                 raise ValueError(f"line {number} names a {name} that is not there: {index}")

@@ -119,10 +119,10 @@ def _candidates(name: str, urdf: Path) -> Iterator[Path]:
     elif name.startswith("package://"):
         with suppress(CharacterError):
             yield files.resolve(name, urdf.parent, CharacterError)
-        # as PyBullet does, and as packages lie in a workspace that is not installed
+        # Above the URDF, as PyBullet looks, and as packages lie in a workspace not installed.
         for folder in urdf.absolute().parents:
             yield folder / name.removeprefix("package://").lstrip("/")
-        # in the package that the URDF lies in, whose folder may have another name
+        # In the package that the URDF lies in, whose folder may have another name.
         yield urdf.absolute().parents[1] / "/".join(name.split("/")[3:])
     else:
         yield urdf.parent / name

@@ -32,7 +32,7 @@ NUMBERS = {  # by element and attribute: how many, and the least that they may b
     "axis": {"xyz": (3, _ANY)},
     "mass": {"value": (1, _POSITIVE)},
     "inertia": {
-        # of at least 0 up to rounding, see `_check_moments`
+        # Moments must be at least 0 up to rounding, see `_check_inertial`.
         **dict.fromkeys((*MOMENTS, "ixy", "ixz", "iyz"), (1, _ANY)),
     },
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1, _ANY)),
@@ -142,7 +142,7 @@ def _check_size(path: Path, robot: ElementTree.Element, joints: list[ElementTree
         raise CharacterError(f"{path}: {len(joints)} joints; there can be {MAX_LINKS}")
     frames = find_frames(robot)
     joints = [joint for joint in joints if joint not in frames]
-    # of a position in the engine, which is a quaternion for a ball joint
+    # Numbers of a joint's position in the engine, which is a quaternion for a ball joint.
     widths = {"spherical": 4, "fixed": 0, FLOATING: 0}
     entries = 7 + sum(widths.get(joint.get("type", ""), 1) for joint in joints)
     if len(joints) > MAX_JOINTS or entries > MAX_POSITION_ENTRIES:

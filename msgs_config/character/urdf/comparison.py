@@ -14,7 +14,7 @@ from msgs_config.character.model import Link, UrdfOptions
 from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.errors import CharacterError
 
-_MAX_DIFFERENCE = 1e-9  # of the largest entry
+_MAX_DIFFERENCE = 1e-9  # share of the largest entry
 
 
 def check_links(links: Sequence[Link], repaired: ElementTree.Element, loading: UrdfOptions) -> None:

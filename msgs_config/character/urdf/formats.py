@@ -41,7 +41,7 @@ _BY_ROOT = {
     "launch": f"a launch file; {_RIGHT}",
     "html": f"a web page, not the file itself; {_RIGHT}",
 }
-_XACRO_SPACE = "xacro"  # in every address under which xacro's name space is declared
+_XACRO_SPACE = "xacro"  # is in every address under which xacro's name space is declared
 
 
 def is_urdf(path: Path) -> bool:
@@ -88,5 +88,5 @@ def _find_xacro(robot: ElementTree.Element) -> str:
             for name, value in element.attrib.items():
                 if "${" in value or "$(" in value:
                     return f"'{name}' of <{element.tag}> as '{value}'"
-    old = robot.find("include")  # of before the prefix
+    old = robot.find("include")  # xacro's own, from before it had a prefix
     return "" if old is None else "<include>"

@@ -26,7 +26,7 @@ LEAST_MASS = 1e-15
 _DIAGONAL, _BESIDE = ("ixx", "iyy", "izz"), (("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
 ENTRIES = (*_DIAGONAL, *(name for name, _, _ in _BESIDE))
 """The attributes of `<inertia>`."""
-_DIGITS = 1e-20  # of the largest entry: what alters no digit of another
+_DIGITS = 1e-20  # share of the largest entry: too little to alter a digit of another
 _NO_POSE = Pose()
 _WATER = 1000.0  # kg/m^3
 _SWEEPS = 20  # of Jacobi's method, which doubles its digits with each
@@ -130,7 +130,7 @@ def nearest_physical(moments: FloatArray) -> Vector:
             if error < least:
                 best, least = found, error
     x, y, z = best
-    # to the last bit, because the engine compares so
+    # Physical to the last bit, because the engine compares so.
     x = min(x, y + z)
     y = min(y, x + z)
     return x, y, min(z, x + y)

@@ -57,7 +57,7 @@ def write_numbers(numbers: Iterable[float]) -> str:
 def move_origin(element: ElementTree.Element, frame: Pose) -> None:
     """Give an element, whose pose is in a frame, its pose in that frame's parent."""
     if frame == Pose():
-        return  # its numbers stay to the last digit
+        return  # the element's numbers stay to the last digit
     pose = read_origin(element)
     turn = np.array(frame.orientation_xyzw)
     write_origin(

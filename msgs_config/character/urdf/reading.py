@@ -15,7 +15,7 @@ DEFAULT_AXIS = "1 0 0"
 FLOATING = "floating"
 """The type of a joint between the world and a base that floats, which is one without it as well."""
 
-_DIGITS = 1e-3  # that the length of a unit vector in a file may be off by its digits
+_DIGITS = 1e-3  # how far the length of a unit vector in a file may be off by its digits
 
 
 class ReadUrdf(NamedTuple):

@@ -27,7 +27,7 @@ from msgs_config.character.urdf.origin import write_origin
 from msgs_config.character.urdf.vocabulary import listed
 from msgs_config.geometry import fixed_order, rotations
 
-_CHANGED = 1e-6  # of the largest moment of inertia: what is more than a file's last digits
+_CHANGED = 1e-6  # share of the largest moment of inertia: more than a file's last digits
 
 
 class Repairs(NamedTuple):
@@ -89,13 +89,13 @@ def _repair_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[str]
     for link in robot.findall("link"):
         inertial = link.find("inertial")
         if inertial is None:
-            write_inertial(link, 0.0, 0.0)  # for which the engine would assume 1 kg and 1 kg m^2
+            write_inertial(link, 0.0, 0.0)  # without it the engine assumes 1 kg and 1 kg m^2
             continue
         mass = inertial.find("mass")
         if mass is not None and read_inertial(link).mass == 0.0 != float(mass.get("value", "0")):
             tiny.append(f"{link.get('name')} ({mass.get('value')})")
             mass.set("value", "0")
-        if inertial.find("inertia") is None:  # which the engine would refuse
+        if inertial.find("inertia") is None:  # the engine refuses it without one
             write_moments(ElementTree.SubElement(inertial, "inertia"), (0.0, 0.0, 0.0))
         if loading.inertia_from_file:
             scaled += _scale_inertia(link)
@@ -150,7 +150,7 @@ def _fill_inertia(link: ElementTree.Element) -> list[str]:
     It is that of a ball of its mass; about one axis, no more than about the others.
     """
     inertia, given = link.find("inertial/inertia"), read_inertial(link)
-    moments = np.diag(given.tensor)  # principal ones by now
+    moments = np.diag(given.tensor)  # principal moments by now
     lacking = moments <= LEAST_MOMENT
     if inertia is None or not given.mass or not lacking.any():
         return []

@@ -57,7 +57,7 @@ def robot_description(character: Character, base_frame: str = BASE_FRAME) -> str
 def _write_joints(robot: ElementTree.Element, joints: DescribedJoints) -> None:
     """Give joints the type, the effort limit and the leader that they have here."""
     elements = {joint.get("name"): joint for joint in robot.findall("joint")}
-    for joint in joints.fixed:  # also what moves no mass
+    for joint in joints.fixed:  # those that move no mass are fixed here as well
         if joint.name in elements:
             elements[joint.name].set("type", "fixed")
             _write_mimic(elements[joint.name], None)

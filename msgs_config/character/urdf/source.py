@@ -29,7 +29,7 @@ def read_urdf_text(path: Path, arguments: Mapping[str, str] | None = None) -> fi
 
 
 def _expand(path: Path, arguments: Mapping[str, str]) -> str:
-    files.read_xml(path, CharacterError)  # names what is no file, or too large
+    files.read_xml(path, CharacterError)  # raises an error that names what is no file, or too large
     if not _has_xacro():
         raise CharacterError(f"{path}: to expand a xacro needs the extra 'xacro': {hint('xacro')}")
     given = [f"{name}:={value}" for name, value in arguments.items()]

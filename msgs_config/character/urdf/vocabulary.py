@@ -52,7 +52,7 @@ _GEOMETRY = _known(
     cylinder=_ROUND,
     capsule=_ROUND,
     mesh=_known("filename scale"),
-    plane=_known("normal"),  # of a terrain
+    plane=_known("normal"),  # only a terrain may have it
 )
 _PART = _known(origin=_ORIGIN, geometry=_GEOMETRY, material=_MATERIAL)
 _INERTIAL = _known(
@@ -61,7 +61,7 @@ _INERTIAL = _known(
     inertia=_known("ixx ixy ixz iyy iyz izz iyx izx izy"),
 )
 _FRICTION = "lateral_friction"
-_CONTACT = (  # Bullet's own
+_CONTACT = (  # Bullet's own elements
     f"{_FRICTION} inertia_scaling rolling_friction spinning_friction restitution stiffness "
     "damping contact_cfm contact_erp friction_anchor"
 )
@@ -124,7 +124,7 @@ class _Collector:
             name = place or part.get("name") or part.get("reference") or ""
             if part.tag not in known.parts:
                 if known is _GEOMETRY and not any(each.tag in known.parts for each in element):
-                    continue  # it is the shape, which is refused
+                    continue  # it stands where the shape belongs, and is refused for that
                 element.remove(part)
                 where = f" in <{element.tag}>" if part.tag in _TAGS else ""
                 self.add(part.tag, f"<{part.tag[:MAX_NAME]}>{where}", name)

@@ -13,7 +13,7 @@ from ament_index_python import packages
 from msgs_config import files
 from msgs_config.errors import CharacterError
 
-_FOLDERS_ABOVE = 6  # of a workspace, in which a package may lie
+_FOLDERS_ABOVE = 6  # how many folders above a file are looked through for a package
 
 
 def find_package(name: str, near: Path) -> str:
