@@ -88,7 +88,8 @@ class Topic:
     session: SessionPlace = SessionPlace.NOWHERE
     is_measured: bool = False  # whether the figures of a run need it
     is_read: bool = False  # whether `Recording` has it
-    is_of_tick: bool = False  # whether the simulator sends one at each tick, and so does a player
+    # whether the simulator sends one at each tick, which begins with its stamp: players send it too
+    is_of_tick: bool = False
     accepted_on: str = ""  # of a request to a node: its topic with what it has accepted
     content: str = ""  # for the documentation
 
