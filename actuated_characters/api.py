@@ -397,7 +397,7 @@ def run(
         reference: The motion: `clip`, `keyframes` or `reference`; none: the rest pose.
 
     Raises:
-        ActuatedCharactersError: a name or a value is wrong, or a process failed.
+        ActuatedCharactersError: a name or a value is wrong, or a node failed.
     """
     if in_process and composed:
         raise ConfigurationError("in_process has no other process; composed must be false")

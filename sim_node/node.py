@@ -77,6 +77,11 @@ class SimNode(ComposableNode):
         """The names of the characters; empty of one that is alone and below no name."""
         return [each.name for each in self._characters]
 
+    def destroy_node(self) -> None:
+        """Leave the bus, and end the engine."""
+        super().destroy_node()
+        self._simulation.close()
+
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, and probe the engine."""
         gravity = loaded.values.number("gravity")

@@ -158,7 +158,7 @@ class ForkNode(Player):
 
     def _end_comparison(self) -> Turns:
         """Wait until all states up to the fork have been compared; the later ones are its own."""
-        yield from self._wait(lambda: self._compared > self._row, f"state {self._compared}")
+        yield from self.wait(lambda: self._compared > self._row, lambda: f"state {self._compared}")
         assert self._states is not None
         self._states.close()
         self._states = None

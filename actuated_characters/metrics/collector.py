@@ -8,7 +8,7 @@ from actuated_characters.bags.rebuilding import rebuild
 from actuated_characters.metrics.falls import PostureReader, reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series
 from actuated_characters.metrics.tick_assembler import TickAssembler
-from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.errors import ActuatedCharactersError, MessageError, RecordingError
 from msgs_config.messages import configuration, topics, typed
 from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
@@ -85,7 +85,8 @@ class MetricsCollector:
         elif topic == MODE:
             self._take_mode(decode_string(raw))
         elif topic == topics.DIAGNOSTICS.name:
-            self._take_counts(typed.decode(raw, "diagnostic_msgs/msg/DiagnosticArray"))
+            with suppress(MessageError):  # it may be of any node
+                self._take_counts(typed.decode(raw, topics.DIAGNOSTICS.type_name))
         elif topic == REFERENCE:
             state = state_in_layout(self._configuration.layout, self._references.decode(raw))
             desired = StampedReference(state.stamp_ns, state.position, state.velocity)

@@ -27,13 +27,18 @@ class InProcessRecorder(ComposableNode):
         """
         super().__init__(node)
         values = resolve(PARAMETERS, node.given_parameters())
-        self._progress, self._progress_period = progress, values.number("progress_period")
+        self._progress = progress
+        self._progress_period = values.number("progress_period") or float("inf")  # 0: never
         self._recorded = wanted_topics(node, values)
         self._recorder = Recorder(node, values)
         self._heard_ns = 0
-        for recorded in self._recorded:
-            self._recorder.add(recorded, recorded.topic.quality)
-            node.listen(recorded.topic, partial(self._hear, recorded))
+        try:
+            for recorded in self._recorded:
+                self._recorder.add(recorded, recorded.topic.quality)
+                node.listen(recorded.topic, partial(self._hear, recorded))
+        except BaseException:
+            self._recorder.close()
+            raise
 
     def _hear(self, recorded: RecordedTopic, raw: bytes) -> None:
         self._heard_ns = max(time.time_ns(), self._heard_ns)  # the wall clock may be set back
@@ -41,7 +46,7 @@ class InProcessRecorder(ComposableNode):
 
     def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Flush the bag and tell the progress where it is time; others' turns are the work."""
-        next_flush = next_word = 0.0
+        next_flush, next_word = 0.0, 0.0 if self._progress_period < float("inf") else float("inf")
         while not stop:
             now = time.monotonic()
             if now >= next_flush:

@@ -1,4 +1,4 @@
-"""Runs a plan: as processes that speak over topics, or joined in one process without ROS."""
+"""Runs a plan as processes that speak over topics."""
 
 import os
 import time

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +18,8 @@ from actuated_characters.runs.senders import check_recorded, plan_senders
 from controller_node.node import ControllerNode
 from msgs_config.bus.composition import ComposableNode, run_nodes
 from msgs_config.bus.in_process import Bus, InProcessNode
-from msgs_config.bus.node import BusNode
-from msgs_config.errors import RecordingError
+from msgs_config.bus.node import BusNode, StopFlag
+from msgs_config.errors import ConfigurationError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from sim_node.node import SimNode
@@ -46,26 +46,35 @@ def run_together(
     Args:
         given: Parameters of each by its full name, such as `left/controller_node`, in the order of
             their turns; the recorder's among them, into whose directory they are recorded.
-        directory: Where parameters and logs go, as those of processes do.
+        directory: Where the logs go, as those of processes do.
         progress: Is told the last tick now and then.
         makers: Of nodes beside simulator and controller, by their names.
 
+    A signal ends the nodes and completes the bag; not before the third one it is left as it is.
+
     Raises:
         ActuatedCharactersError: one of the nodes failed.
+        RunError: it was interrupted by a signal, whose own handler raised nothing.
     """
     makers = {**_MAKERS, **makers}
     bus = Bus(partial(_log, directory / LOGS))
     places: dict[str, InProcessNode] = {}
     for full_name, parameters in given.items():
         namespace, _, name = full_name.rpartition("/")
-        write_parameters(directory, full_name.replace("/", "."), parameters, full_name)
         places[full_name] = bus.node(name, parameters, namespace)
     recording = places.pop(topics.RECORDER_NODE)
-    with signals_held(most=1) as stop, _recorder(recording, progress) as recorder:
+    with (
+        signals_held(most=2) as stop,
+        _recorder(recording, progress, stop) as recorder,
+        ExitStack() as at_end,
+    ):
         nodes: list[ComposableNode] = [recorder]
         for place in places.values():
             nodes.append(makers[place.get_name()](place))
+            at_end.callback(nodes[-1].destroy_node)
         run_nodes(nodes, stop)
+    if stop:
+        raise RunError("the run was interrupted by a signal")
 
 
 def run_in_process(
@@ -88,27 +97,45 @@ def run_in_process(
     `make_sender` makes the node that sends what was planned.
 
     Raises:
+        ConfigurationError: the simulator would pause at a fault.
         ActuatedCharactersError: one of the nodes failed, or the simulator rejected an input.
     """
-    session = {SESSION.name: make_session("/sim_node")}
+    for name in ("on_fault", "on_timeout"):
+        if plan.simulator.text(name) == "pause":
+            raise ConfigurationError(
+                f"parameter '{name}' is pause, after which nobody could resume a simulator whose "
+                "services are in this process alone; set it to abort"
+            )
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
     planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
     senders = plan_senders(directory, planned, recording, fork)
-    given: dict[str, dict[str, object]] = {
+    given: dict[str, Mapping[str, object]] = {
         "recorder": {**recording, "progress_period": _PROGRESS_PERIOD},
         **senders,
-        "controller_node": {**plan.controller, "wait_for_subscribers": 2 + len(senders)},
-        "sim_node": {**plan.simulator, "wait_for_subscribers": 2 + (fork is not None)},
+        "controller_node": plan.controller,
+        "sim_node": plan.simulator,
     }
-    given = {name: {**parameters, **session} for name, parameters in given.items()}
-    run_together(given, directory, progress, makers=dict.fromkeys(senders, make_sender))
+    for name, parameters in given.items():
+        write_parameters(directory, name, parameters)
+    session = {SESSION.name: make_session("/sim_node")}
+    awaited = {"controller_node": 2 + len(senders), "sim_node": 2 + (fork is not None)}
+    run_together(
+        {
+            name: {**parameters, **session}
+            | ({"wait_for_subscribers": awaited[name]} if name in awaited else {})
+            for name, parameters in given.items()
+        },
+        directory,
+        progress,
+        makers=dict.fromkeys(senders, make_sender),
+    )
     counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
     check_recorded(directory, plan.ticks - resets, counts)
 
 
 @contextmanager
 def _recorder(
-    node: InProcessNode, progress: Callable[[int], object]
+    node: InProcessNode, progress: Callable[[int], object], stop: StopFlag
 ) -> Iterator[InProcessRecorder]:
     """A recorder whose bag and figures are there in the end, also after an error of the others."""
     recorder = InProcessRecorder(node, progress)
@@ -120,11 +147,15 @@ def _recorder(
             recorder.conclude()
         raise
     recorder.close()
-    recorder.conclude()
+    with suppress(RecordingError) if stop else nullcontext():
+        recorder.conclude()
 
 
 def _log(folder: Path, name: str, severity: str, sentence: str) -> None:
     """Write what a node logs into its file, as rcutils does."""
     line = f"[{severity.upper().removesuffix('ING')}] [{time.time():.9f}] [{name}]: {sentence}\n"
-    with (folder / f"{name.replace('/', '.')}.log").open("a", encoding="utf-8") as file:
+    with (
+        suppress(OSError),  # a full disk; the bag says so
+        (folder / f"{name.replace('/', '.')}.log").open("a", encoding="utf-8") as file,
+    ):
         file.write(line)

@@ -1,1 +1,1 @@
-"""The controller's ROS interface: subscribers and publishers."""
+"""The controller's Interface: subscribers and publishers."""

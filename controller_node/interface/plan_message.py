@@ -16,7 +16,7 @@ _FIELD = "sensor_msgs/msg/PointField"
 
 
 def plan_message(outlook: Outlook, stamp_ns: int) -> bytes:
-    """The serialised message, one point for each check; `stamp_ns` is of the first state of all."""
+    """The message, a point for each check; `stamp_ns` is of the state that the plan was made in."""
     count, anchor = len(outlook.times), outlook.anchor
     rows = np.empty((count, len(FIELDS)))
     rows[:, :3] = outlook.centres

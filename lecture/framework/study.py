@@ -70,7 +70,7 @@ class StudyRunner(Protocol):
         """Run a case to its end, or until it diverges.
 
         Raises:
-            ActuatedCharactersError: a parameter is wrong, or a process failed.
+            ActuatedCharactersError: a parameter is wrong, or a node failed.
         """
         ...
 

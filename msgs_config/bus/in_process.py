@@ -1,20 +1,23 @@
 """A bus of one process and one thread, without ROS: what is published is there at once, in order.
 
 Nodes on it take turns (see `composition`). A service is handled, and parameters are set, within the
-call; its node is between two turns then.
+call: by a player's turn, or by whoever is handed a message while it is published.
 """
 
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
+from msgs_config.bus.composition import errors_of
 from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, Values
 
 _LONGEST_REST = 0.02  # s
+_SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _REST = 0.001  # s between looks at what wall time decides
 _MOST_LATCHED = 100  # messages of one publisher
 
@@ -40,7 +43,9 @@ class Bus:
     def node(self, name: str, given: Mapping[str, object], namespace: str = "") -> "InProcessNode":
         """A place for a node, with the values of parameters that it is given."""
         node = InProcessNode(self, name, namespace, given)
-        self._nodes[node.get_fully_qualified_name()] = node
+        full_name = node.get_fully_qualified_name()
+        assert full_name not in self._nodes, f"two nodes {full_name}"
+        self._nodes[full_name] = node
         return node
 
     def find(self, name: str) -> "InProcessNode | None":
@@ -48,15 +53,21 @@ class Bus:
         return self._nodes.get(name)
 
     def remove(self, node: "InProcessNode") -> None:
-        """Forget a node, which hears and says nothing any more."""
-        name = node.get_fully_qualified_name()
-        self._nodes.pop(name, None)
-        for channel in self._channels.values():
-            channel.publishers = [each for each in channel.publishers if each.node != name]
+        """Forget a node."""
+        self._nodes.pop(node.get_fully_qualified_name(), None)
 
     def channel(self, name: str) -> "_Channel":
         """The topic of an absolute name."""
         return self._channels.setdefault(name, _Channel())
+
+
+class InProcessLog:
+    """A node's log, which goes where its bus says."""
+
+    def __init__(self, bus: Bus, name: str) -> None:
+        self.info, self.warning, self.error = (
+            partial(bus.write, name, severity) for severity in ("info", "warning", "error")
+        )
 
 
 class _Channel:
@@ -81,15 +92,19 @@ class InProcessPublisher:
         self.topic_name, self.node, self.type_name = name, node, topic.type_name
         depth = min(topic.quality.depth, _MOST_LATCHED) if topic.quality.is_latched else 0
         self.latched: deque[bytes] = deque(maxlen=depth)
-        self._deliveries = channel.deliveries
+        self._channel, self._deliveries = channel, channel.deliveries
         self.get_subscription_count = channel.deliveries.__len__
         channel.publishers.append(self)
 
     def publish(self, raw: bytes) -> None:
         """Hand a message to every subscriber."""
-        self.latched.append(raw)
-        for deliver in self._deliveries:
+        for deliver in tuple(self._deliveries):  # who hears it may subscribe, or no longer
             deliver(raw)
+        self.latched.append(raw)
+
+    def close(self) -> None:
+        """Offer the topic no more."""
+        self._channel.publishers.remove(self)
 
     def is_acknowledged(self, seconds: float) -> bool:
         """Whether every subscriber has all that was published: always."""
@@ -100,10 +115,23 @@ class InProcessPublisher:
 class InProcessSubscription:
     """The serialised messages on one topic of the process, oldest first."""
 
-    def __init__(self, channel: _Channel, topic: Topic) -> None:
-        self._pending: deque[bytes] = deque(maxlen=topic.quality.depth)
-        self._deliver, self._deliveries = self._pending.append, channel.deliveries
+    def __init__(self, channel: _Channel, topic: Topic, log: InProcessLog) -> None:
+        self._pending: deque[bytes] = deque()
+        self._name, self._log = topic.name, log
+        self._most, self._has_dropped = topic.quality.depth, False
+        self._deliveries = channel.deliveries
         channel.subscribe(self._deliver)
+
+    def _deliver(self, raw: bytes) -> None:
+        self._pending.append(raw)
+        if len(self._pending) > self._most:
+            self._pending.popleft()
+            if self._most > 1 and not self._has_dropped:  # with a depth of 1 the newest is all
+                self._has_dropped = True
+                self._log.warning(
+                    f"'{self._name}': more than {self._most} messages wait to be taken; the "
+                    "oldest are dropped, which is logged once"
+                )
 
     def take(self) -> bytes | None:
         """The next message; None if there is none now."""
@@ -115,7 +143,8 @@ class InProcessSubscription:
 
     def close(self) -> None:
         """End the subscription; what was not taken is lost."""
-        self._deliveries.remove(self._deliver)
+        if self._deliver in self._deliveries:
+            self._deliveries.remove(self._deliver)
         self._pending.clear()
 
 
@@ -136,24 +165,17 @@ class InProcessClient:
         handler = None if node is None else node.handlers.get(service)
         if handler is None:
             return Answer(False, f"{self._name} has no service {service}")
-        return handler(flag)
+        with errors_of(self._name.lstrip("/")):
+            return handler(flag)
 
     def set_parameters(self, values: Mapping[str, Any]) -> Answer:
         """Set parameters of the node, all or none."""
         node = self._bus.find(self._name)
         if node is None:
             return Answer(False, f"there is no node {self._name}")
-        reason = node.try_parameters(values)
+        with errors_of(self._name.lstrip("/")):
+            reason = node.try_parameters(values)
         return Answer(not reason, reason)
-
-
-class InProcessLog:
-    """A node's log, which goes where its bus says."""
-
-    def __init__(self, bus: Bus, name: str) -> None:
-        self.info, self.warning, self.error = (
-            partial(bus.write, name, severity) for severity in ("info", "warning", "error")
-        )
 
 
 class InProcessExecutor:
@@ -169,8 +191,8 @@ class InProcessExecutor:
         time.sleep(_REST)
 
     def rest_for(self, seconds: float) -> None:
-        """Let wall time pass."""
-        time.sleep(min(seconds, _LONGEST_REST))
+        """Let wall time pass; ends early rather than late."""
+        time.sleep(max(min(seconds, _LONGEST_REST) - _SLEEP_ERROR, 0.0))
 
 
 class InProcessNode:
@@ -185,6 +207,7 @@ class InProcessNode:
         self._declared: dict[str, Parameter] = {}
         self._refusal: Refusal = lambda changes: ""
         self._change: Change = lambda changes: None
+        self._at_end = ExitStack()  # what the node has open on the bus
 
     def get_name(self) -> str:
         """Its name in its namespace."""
@@ -228,15 +251,21 @@ class InProcessNode:
         """A publisher on a topic of the contract."""
         name = self.resolve_topic_name(topic.name)
         channel = self._bus.channel(name)
-        return InProcessPublisher(channel, topic, name, self.get_fully_qualified_name())
+        publisher = InProcessPublisher(channel, topic, name, self.get_fully_qualified_name())
+        self._at_end.callback(publisher.close)
+        return publisher
 
     def subscription(self, topic: Topic) -> InProcessSubscription:
         """A subscription of a topic of the contract."""
-        return InProcessSubscription(self._channel(topic.name), topic)
+        subscription = InProcessSubscription(self._channel(topic.name), topic, self._log)
+        self._at_end.callback(subscription.close)
+        return subscription
 
     def listen(self, topic: Topic, deliver: Deliver) -> None:
         """Have each message handed over while it is published, so in order over all topics."""
-        self._channel(topic.name).subscribe(deliver)
+        channel = self._channel(topic.name)
+        channel.subscribe(deliver)
+        self._at_end.callback(channel.deliveries.remove, deliver)
 
     def offer(self, service: str, handler: Handler, *, takes_flag: bool = False) -> None:
         """Offer `~/SERVICE`."""
@@ -268,6 +297,9 @@ class InProcessNode:
                 return f"parameter '{name}' is not declared"
             if not self._declared[name].when_changed:
                 return f"parameter '{name}' cannot be changed"
+            expected, found = type(self._declared[name].default), type(values[name])
+            if found is not expected:  # as over DDS, also where one could stand for the other
+                return f"parameter '{name}' is of type {found.__name__}, not {expected.__name__}"
         reason = self._refusal(dict(values))
         if not reason:
             self._change(dict(values))
@@ -287,8 +319,9 @@ class InProcessNode:
         return InProcessExecutor()
 
     def destroy_node(self) -> None:
-        """Leave the bus."""
+        """Leave the bus: it hears and says nothing any more."""
         self._bus.remove(self)
+        self._at_end.close()
 
     def _channel(self, name: str) -> _Channel:
         return self._bus.channel(self.resolve_topic_name(name))

@@ -35,7 +35,7 @@ class Publisher(Protocol):
         """How many subscribe."""
 
     def is_acknowledged(self, seconds: float) -> bool:
-        """Wait until every subscriber has all that was published, at most so long; whether so."""
+        """Whether every subscriber has all that was published, within so long, which it waits."""
 
 
 class Subscription(Protocol):
@@ -111,7 +111,7 @@ class Client(Protocol):
 
     @property
     def is_ready(self) -> bool:
-        """Whether the other node answers."""
+        """Whether the other node is there to be called."""
 
     def call(self, service: str, flag: bool = True) -> Answer:
         """Call `~/SERVICE` of the node, with the flag where it takes one."""
@@ -198,7 +198,7 @@ class BusNode(Protocol):
         """The values that a user has set for this node."""
 
     def declare(self, parameters: Iterable[Parameter], values: Values) -> None:
-        """Declare parameters with their values."""
+        """Declare parameters with their values, which who watches them may be told as a change."""
 
     def watch_parameters(self, refusal: Refusal, change: Change) -> None:
         """Let changes of parameters be refused before any is taken, and taken together."""

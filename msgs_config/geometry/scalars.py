@@ -2,7 +2,8 @@
 
 Quaternions are xyzw, and turn coordinates of the child frame into the parent frame; so do axes,
 which are the rows of a rotation matrix. Sums have the order of `msgs_config.geometry.fixed_order`,
-so that functions of `msgs_config.geometry.rotations` with the same names give the same doubles.
+so that functions of `msgs_config.geometry.rotations` with the same names give the same doubles, but
+for `rotate` and `right_jacobian_inverse`, which are written otherwise.
 """
 
 import math

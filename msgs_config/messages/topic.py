@@ -111,7 +111,7 @@ class Topic:
     def is_installed(self) -> bool:
         """Whether the package of its message type is; that of `/tf` is not among the wheels.
 
-        Where there is no ROS at all, nobody needs it, and it counts as installed.
+        Where there is no ROS at all, a run in one process has all topics: no other run lacks one.
         """
         packages = self.type_name.partition("/")[0], "rclpy"
         return find_spec(packages[0]) is not None or find_spec(packages[1]) is None

@@ -14,8 +14,9 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from msgs_config.errors import MessageError
-from msgs_config.messages.cdr import padding, split_stamp
+from msgs_config.messages.cdr import JOINT_STATE, padding, read_message, split_stamp
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.topic import find_message_class
 
 JOINT_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 _HEAD = 4  # bytes of the encapsulation header, which says the order of bytes
@@ -23,7 +24,7 @@ _READERS = {
     b"\0\0": attrgetter("deserialize_cdr_be"),
     b"\0\1": attrgetter("deserialize_cdr_le"),
 }
-_QUATERNION = "geometry_msgs/msg/Quaternion"  # the only type with a default that is not zero
+_QUATERNION = "geometry_msgs/msg/Quaternion"  # of the contract's types alone has a default but zero
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 
@@ -100,14 +101,29 @@ def decode(raw: bytes, type_name: str) -> Any:
         MessageError: the bytes are no such message.
     """
     try:
-        definition = types().get_msgdef(type_name)
-        read = _READERS[raw[:2]](definition)
-        message, end = read(raw[_HEAD:], 0, definition.cls, types())
-        if end > len(raw) - _HEAD:
-            raise ValueError("a text that is longer than the message")
-    except Exception as error:  # what is too short or malformed raises anything
+        try:
+            return _read(raw, type_name)
+        except Exception:  # what is too short or malformed raises anything
+            return _read(_as_ros_reads_it(raw, type_name), type_name)
+    except Exception as error:
         name = type_name.rpartition("/")[2]
         raise MessageError(f"{len(raw)} bytes that are no {name}") from error
-    return (
-        message  # bytes behind it, which a middleware may leave in too large a buffer, do not count
-    )
+
+
+def _read(raw: bytes, type_name: str) -> Any:
+    """A message, without what a middleware may have left behind it."""
+    definition = types().get_msgdef(type_name)
+    read = _READERS[raw[:2]](definition)
+    message, end = read(raw[_HEAD:], 0, definition.cls, types())
+    if end > len(raw) - _HEAD:
+        raise ValueError("a text that is longer than the message")
+    return message
+
+
+def _as_ros_reads_it(raw: bytes, type_name: str) -> bytes:
+    """The message written anew by rclpy, which reads texts that are not UTF-8, or end nowhere."""
+    from rclpy.serialization import deserialize_message, serialize_message
+
+    if type_name == JOINT_STATE:  # the middleware would print a line if a list is too long
+        read_message(raw, JOINT_STATE)
+    return bytes(serialize_message(deserialize_message(raw, find_message_class(type_name))))

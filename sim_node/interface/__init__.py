@@ -1,1 +1,1 @@
-"""The simulator's ROS interface: subscribers, publishers, services."""
+"""The simulator's Interface: subscribers, publishers, services."""

@@ -1,4 +1,4 @@
-"""ROS interface of one character: subscribes to commands and wrenches, publishes its state."""
+"""Interface of one character: subscribes to commands and wrenches, publishes its state."""
 
 import numpy as np
 

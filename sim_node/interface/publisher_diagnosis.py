@@ -27,18 +27,18 @@ def describe_conflict(node: BusNode, joint: str, topic: Topic) -> str:
 
 def describe_publishers(node: BusNode, topic: Topic) -> str:
     """One sentence: the nodes that publish on a topic, and whose type or QoS does not fit."""
-    endpoints = node.endpoints(topic)
-    if not endpoints:
+    names = publisher_names(node, topic)
+    if not names:
         return f"'{topic.name}' has no publisher"
-    sentence = f"'{topic.name}' is published by {', '.join(publisher_names(node, topic))}"
-    others = {
-        (each.node, each.type_name) for each in endpoints if each.type_name != topic.type_name
-    }
-    for name, other_type in sorted(others):
-        sentence += f"; the type of {name} is {other_type}, and must be {topic.type_name}"
-    for each in endpoints:
+    sentence = f"'{topic.name}' is published by {', '.join(names)}"
+    endpoints = [(each.node or _UNKNOWN_NODE, each) for each in node.endpoints(topic)]
+    types = {(name, each.type_name) for name, each in endpoints}
+    for name, found in sorted(types):
+        if found != topic.type_name:
+            sentence += f"; the type of {name} is {found}, and must be {topic.type_name}"
+    for name, each in endpoints:
         if each.misfit:
-            sentence += f"; the QoS of {each.node.rpartition('/')[2]} does not fit: {each.misfit}"
+            sentence += f"; the QoS of {name.rpartition('/')[2]} does not fit: {each.misfit}"
     return sentence
 
 

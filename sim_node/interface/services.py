@@ -62,9 +62,10 @@ class Services:
             self._control.begin_steps(ticks)
         except CommandError as error:
             return Answer(False, str(error))
-        self._steps, self._stepped = Answer(), ticks
-        self._resume()
-        return self._steps
+        answer = self._steps = Answer()
+        self._stepped = ticks
+        self._resume()  # which may end the steps at once
+        return answer
 
     def _on_reset(self, _: bool) -> Answer:
         self._control.reset()

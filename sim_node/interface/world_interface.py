@@ -1,4 +1,4 @@
-"""ROS interface of the world: takes throws, and publishes the balls."""
+"""Interface of the world: takes throws, and publishes the balls."""
 
 from collections.abc import Iterator
 

@@ -31,7 +31,7 @@ def assert_same_messages(alone: Path, sent: Path) -> None:
     one, other = messages_by_topic(alone), messages_by_topic(sent)
     assert one.keys() == other.keys()
     for topic, messages in one.items():
-        found = other[topic]
+        found, shown = other[topic], set(messages)
         if topic.endswith(_SHOWN_AGAIN):
-            found = [raw for raw in found if raw in set(messages)]
+            found = [raw for raw in found if raw in shown]
         assert messages == found, topic

@@ -53,7 +53,7 @@ class Player(ComposableNode):
         while not self.stop and not condition():
             yield UNTIL_A_MESSAGE
             now = time.monotonic()
-            if now > begun + timeout:
+            if now > begun + timeout and not condition():  # another node's turn may be that long
                 raise RunError(f"waited {timeout:g} s for {what()}")
             if now > next_line and not self._is_silent:
                 next_line = now + _WAITING_PERIOD

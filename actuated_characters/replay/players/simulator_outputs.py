@@ -11,6 +11,7 @@ import numpy as np
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import Recording, find_bag, read_recording
+from msgs_config.arrays import IntArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics, typed
 from msgs_config.messages.cdr import (
@@ -165,25 +166,26 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
                 message.raw, types[message.topic]
             )  # what is none of its type is not sent again
             by_topic.setdefault(message.topic, []).append((message.sent_ns, message.raw))
+    answered = np.maximum.accumulate(
+        [commands[0].published_ns if commands else 0 for commands in recording.commands]
+    )
     for topic, active in zip(REQUESTS, _ACCEPTED, strict=True):
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
         for published_ns, raw in sent:
-            row = _row(recording, published_ns, _raw_stamp_ns(raw))
+            row = _row(recording.stamps_ns, answered, published_ns, _raw_stamp_ns(raw))
             if row is not None:
                 rare.requests.setdefault(row, []).append((topic.name, raw))
     return rare
 
 
-def _row(recording: Recording, published_ns: int, start_ns: int) -> int | None:
-    """The state before whose answer a message came; None if there is none.
+def _row(stamps: IntArray, answered: IntArray, published_ns: int, start_ns: int) -> int | None:
+    """The row of the state before whose answer a message came; None if there is none.
 
+    `answered` (t + 1,) are the times, ns, by which the states of the `stamps` were answered.
     The controller published what it accepted before that answer, but two topics of a bag that
     another recorder has written may be out of order: it came before it began, too.
     """
-    stamps = recording.stamps_ns
-    answered = np.array([c[0].published_ns if c else 0 for c in recording.commands])
-    later = np.flatnonzero(answered >= published_ns)
-    row = int(later[0]) if len(later) else len(stamps)
+    row = int(np.searchsorted(answered, published_ns))
     if start_ns:
         row = min(row, int(np.searchsorted(stamps, start_ns, side="right")) - 1)
     return row if 0 <= row < len(stamps) else None

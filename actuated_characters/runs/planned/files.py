@@ -1,4 +1,4 @@
-"""The files by which planned pushes and throws reach the process that sends them."""
+"""The files by which planned pushes and throws reach the node that sends them."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence

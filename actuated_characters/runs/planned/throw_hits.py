@@ -25,7 +25,7 @@ States: TypeAlias = list[tuple[FloatArray, FloatArray]]
 
 def read_states(bag: Path) -> States | None:
     """The states of a recorded run; None if it has no motion of balls."""
-    from actuated_characters.bags.recording import read_recording  # it needs ROS
+    from actuated_characters.bags.recording import read_recording
 
     recording = read_recording(bag)
     nothing = np.empty((0, 13))

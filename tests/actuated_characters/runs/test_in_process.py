@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.commands.run import PlannedRun
@@ -16,7 +17,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.throws import plan_throws
 from actuated_characters.runs.planned.velocities import plan_velocities
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
-from msgs_config.errors import RunError, SimulationError
+from msgs_config.errors import ConfigurationError, RunError, SimulationError
 from msgs_config.messages.clock import TickClock
 from tests.support.recorded_nodes import PAIR, record_pair, record_pair_in_process
 from tests.support.ros import Processes
@@ -126,6 +127,41 @@ def test_without_a_bag_it_has_the_same_figures(tmp_path: Path) -> None:
     hashes = [read_metrics(tmp_path / name)[0]["state_hash"] for name in ("with", "without")]
     assert hashes[0] == hashes[1]
     assert (tmp_path / "with" / "bag").exists() and not (tmp_path / "without" / "bag").exists()
+
+
+def test_its_parameter_files_are_those_of_a_run_over_topics(tmp_path: Path) -> None:
+    directory = in_process(pushed_walk(), tmp_path / "run")
+
+    for name in ("sim_node", "controller_node"):
+        file = yaml.safe_load((directory / "parameters" / f"{name}.yaml").read_text())
+        parameters = file[name]["ros__parameters"]
+        assert parameters["session"] == "" and parameters["wait_for_subscribers"] < 2
+
+
+def test_a_simulator_that_would_pause_for_good_is_refused(tmp_path: Path) -> None:
+    plan = make_plan("pendulum", 0.1, {}, {"on_fault": "pause"}, {})
+    prepare_directory(tmp_path / "run", overwrite=False)
+
+    with pytest.raises(ConfigurationError, match="'on_fault' is pause"):
+        run_in_process(plan, tmp_path / "run")
+
+
+def test_a_signal_whose_handler_raises_nothing_ends_it_all_the_same(tmp_path: Path) -> None:
+    plan = make_plan("pendulum", 600.0, {}, {}, {})
+    prepare_directory(tmp_path / "run", overwrite=False)
+    before = signal.signal(signal.SIGINT, lambda number, frame: None)
+
+    def interrupt(ticks: int) -> None:
+        if ticks > 10:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    try:
+        with pytest.raises(RunError, match="interrupted by a signal"):
+            run_in_process(plan, tmp_path / "run", progress=interrupt)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+    assert len(read_recording(tmp_path / "run").effort) > 10
 
 
 def test_real_time_is_the_walls(tmp_path: Path) -> None:
