@@ -3,6 +3,7 @@
 import codecs
 import importlib.util
 import re
+from collections.abc import Callable
 from contextlib import suppress
 from copy import deepcopy
 from functools import lru_cache
@@ -14,6 +15,10 @@ from xml.parsers import expat
 import yaml
 
 from msgs_config.errors import ActuatedCharactersError
+
+_find_in_ros: Callable[[str], str] | None = None
+with suppress(ImportError):  # without ROS
+    from ament_index_python.packages import get_package_share_directory as _find_in_ros
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
 MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
@@ -52,10 +57,9 @@ def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) 
 
 
 def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Path:
-    with suppress(ImportError, LookupError, ValueError, OSError):  # without ROS, or its environment
-        from ament_index_python.packages import get_package_share_directory
-
-        return Path(get_package_share_directory(package))
+    with suppress(LookupError, ValueError, OSError):  # OSError: no ROS environment
+        if _find_in_ros is not None:
+            return Path(_find_in_ros(package))
     with suppress(ValueError):  # a module that was never found, such as the main one
         spec = importlib.util.find_spec(package) if package.isidentifier() else None
         if spec is not None and spec.submodule_search_locations:

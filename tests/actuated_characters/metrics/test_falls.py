@@ -230,7 +230,8 @@ def test_a_machine_that_is_thrown_down_fell_and_its_root_has_no_error(tmp_path: 
 
     run = InProcessRunner(tmp_path).run(spec)
 
-    assert run.diverged or run.recording.position[-1, 2] < 0.5  # m, by the test's own eyes
+    heights = run.recording.position[:, 2]
+    assert run.diverged or heights.min() < 0.2  # m: the root has lain on the ground
     assert run.summary["fell"] is True and run.summary["fell_in_mode"] == "STATE"
     assert run.summary["root_error_mean_m"] is run.summary["root_error_max_m"] is None
 

@@ -536,7 +536,7 @@ def test_without_a_simulator_there_are_no_figures() -> None:
         heard(pendulum_messages()).results()[0]
 
 
-@pytest.mark.parametrize("topic", [STATE, REFERENCE, topics.DIAGNOSTICS.name, CONFIGURATION])
+@pytest.mark.parametrize("topic", [STATE, REFERENCE, CONFIGURATION])
 @pytest.mark.parametrize("raw", [b"", b"\x00\x01\x00\x00\xff\xff\xff\xff"], ids=["no", "some"])
 def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, raw: bytes) -> None:
     collector = heard([configuration_message(), *pendulum_messages()])
@@ -544,5 +544,14 @@ def test_bytes_that_are_no_message_are_an_error_of_the_projects_own(topic: str, 
 
     with pytest.raises(ActuatedCharactersError):
         collector.take(topic, raw, 0)
+
+    assert collector.results()[0] == before
+
+
+def test_diagnostics_that_are_none_are_left_out_for_any_node_may_have_sent_them() -> None:
+    collector = heard([configuration_message(), *pendulum_messages()])
+    before = collector.results()[0]
+
+    collector.take(topics.DIAGNOSTICS.name, b"\x00\x01\x00\x00\xff\xff\xff\xff", 0)
 
     assert collector.results()[0] == before
