@@ -58,13 +58,16 @@ def pushed(folder: Path, seed: int) -> RunResult:
     return InProcessRunner(folder).run(spec)
 
 
-def test_of_24_pushed_machines_those_fell_that_are_seen_to(tmp_path: Path) -> None:
-    runs = [pushed(tmp_path, seed) for seed in range(24)]
+@pytest.mark.parametrize(
+    "seeds", [range(6, 14), pytest.param(range(24), marks=pytest.mark.nightly)]
+)
+def test_of_pushed_machines_those_fell_that_are_seen_to(tmp_path: Path, seeds: range) -> None:
+    runs = [pushed(tmp_path, seed) for seed in seeds]
 
     seen = [seen_to_fall("humanoid", run.recording.position) for run in runs]
     told = [run.summary["fell"] for run in runs]
     assert told == seen
-    assert 3 <= sum(seen) <= 21  # of both kinds
+    assert 3 <= sum(seen) <= len(seeds) - 3  # of both kinds
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0])
