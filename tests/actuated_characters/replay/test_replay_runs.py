@@ -93,7 +93,7 @@ def test_two_resets_a_pause_and_clipped_torques_come_again(
     recording_process = recorder(processes)
     motion = {"initial_velocity": [0.5] * 34, "speed_limit": 1e6}
     order = {"republish_period": 0.05, "step_count": 5, "wait_for_subscribers": 2}
-    processes.simulator("humanoid", **motion, **order, **given)
+    simulator = processes.simulator("humanoid", **motion, **order, **given)
     rng = np.random.default_rng(5)
     state = client.first_state(listeners=2)
     state = drive_hard(client, state, 40, rng)
@@ -106,6 +106,8 @@ def test_two_resets_a_pause_and_clipped_torques_come_again(
     assert response_of(client, call)[0]
     client.pause(False)
     state = drive_hard(client, state, 20, rng)
+    simulator.send(signal.SIGINT)  # it ends when the recorder, too, has the last states
+    assert simulator.wait() == 0
     bag = ended(recording_process, tmp_path)
 
     recording = read_recording(bag)
