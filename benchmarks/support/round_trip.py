@@ -29,6 +29,7 @@ from msgs_config.runtime.process import StopSignal, run_node
 _PING = replace(topics.JOINT_STATES, name="ping")
 _PONG = replace(topics.JOINT_TORQUES, name="pong")
 _WARM_UP = 200
+_REST = 0.001  # s between looks for the near side
 _PATIENCE = 60.0  # s for the other side to appear, and for each answer
 _SIZE, _WAY = "BENCHMARK_ANSWER_BYTES", "BENCHMARK_WAY"
 _DIRECT, _EXECUTOR = "direct", "executor"
@@ -115,6 +116,8 @@ class FarSide(Node):
     def run(self, stop: StopSignal) -> None:
         """Answer until a signal."""
         with self._at_end:
+            while not stop and not self._publisher.get_subscription_count():
+                time.sleep(_REST)  # an answer that nobody hears yet would be waited for
             while not stop:
                 if self._take():
                     self._publisher.publish(self._reply)
