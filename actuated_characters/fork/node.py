@@ -5,7 +5,6 @@ them. Up to the fork it compares each state with the recorded one.
 """
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -114,7 +113,7 @@ class ForkNode(Player):
             RunError: a node does not answer, or does not accept what it is sent.
         """
         # no limit for the start: the command that has started all knows one
-        yield from self._wait(self._is_connected, "simulator and controller", np.inf)
+        yield from self.wait(self._is_connected, lambda: "simulator and controller", np.inf)
         # the first tick is held by its time: a paused simulator would not repeat the first state
         yield from self._set(topics.SIM_NODE, {_PACE: _HELD_PACE})
         yield from self._send(0)
@@ -178,7 +177,9 @@ class ForkNode(Player):
             raw = self._throw_codec.encode(throw.stamp_ns, throw.throw)
             messages.append((topics.THROW.name, raw))
         for name, message in messages:
-            yield from self._wait(partial(self._is_heard, name), f"subscribers of '{name}'")
+            yield from self.wait(
+                partial(self._is_heard, name), partial("subscribers of '{}'".format, name)
+            )
             self._outgoing[name][0].publish(message)
         for name in dict.fromkeys(name for name, _ in messages):
             self.acknowledge(self._outgoing[name][0], f"what was sent on '{name}'")
@@ -187,8 +188,11 @@ class ForkNode(Player):
 
     def _wait_for_answer(self, row: int, timeout: float = ANSWER_TIMEOUT) -> Turns:
         stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + row)
-        what = f"the answer to the state of {stamp_ns} ns"
-        yield from self._wait(lambda: self._answered_ns >= stamp_ns, what, timeout)
+        yield from self.wait(
+            lambda: self._answered_ns >= stamp_ns,
+            lambda: f"the answer to the state of {stamp_ns} ns",
+            timeout,
+        )
 
     def _set(self, node: str, settings: dict[str, Any]) -> Turns:
         yield from self.set_parameters(self._clients[node], node, settings)
@@ -197,32 +201,12 @@ class ForkNode(Player):
         simulator = self._clients[topics.SIM_NODE]
         yield from self.call(simulator, topics.SIM_NODE, name, flag=flag, timeout=timeout)
 
-    def wait(
-        self,
-        condition: Callable[[], object],
-        what: Callable[[], str],
-        timeout: float = ANSWER_TIMEOUT,
-    ) -> Turns:
-        """Wait for a condition, and compare the states that come meanwhile.
+    def look(self) -> None:
+        """Take the states and torques that have come, of the session of this run.
 
         Raises:
             ReplayError: see `play`.
-            RunError: it has taken longer than the timeout in s.
         """
-
-        def holds() -> bool:
-            self._take_messages()
-            return bool(condition())
-
-        yield from super().wait(holds, what, timeout)
-
-    def _wait(
-        self, condition: Callable[[], object], what: str, timeout: float = ANSWER_TIMEOUT
-    ) -> Turns:
-        yield from self.wait(condition, lambda: what, timeout)
-
-    def _take_messages(self) -> None:
-        """Take the states and torques that have come, of the session of this run."""
         while self._states is not None and (raw := self._states.take()) is not None:
             arrays = self._state_decoder.decode(raw)
             expected_ns = self._tick_clock.stamp_ns(FIRST_TICK + self._compared)

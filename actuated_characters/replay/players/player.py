@@ -37,6 +37,9 @@ class Player(ComposableNode):
         """Play to the end, or until `stop`."""
         raise NotImplementedError
 
+    def look(self) -> None:
+        """Take what has come, before what is waited for is looked at."""
+
     def wait(
         self,
         condition: Callable[[], object],
@@ -50,14 +53,19 @@ class Player(ComposableNode):
         """
         begun = time.monotonic()
         next_line = begun + _WAITING_PERIOD
-        while not self.stop and not condition():
+        while not self.stop and not self._holds(condition):
             yield UNTIL_A_MESSAGE
             now = time.monotonic()
-            if now > begun + timeout and not condition():  # another node's turn may be that long
+            # the turn of another node may have taken that long
+            if now > begun + timeout and not self._holds(condition):
                 raise RunError(f"waited {timeout:g} s for {what()}")
             if now > next_line and not self._is_silent:
                 next_line = now + _WAITING_PERIOD
                 print(f"{WAITING}{what()}", flush=True)
+
+    def _holds(self, condition: Callable[[], object]) -> bool:
+        self.look()
+        return bool(condition())
 
     def tell_state(self, count: int) -> None:
         """Print the number of states so far, ten times a second at the most."""
