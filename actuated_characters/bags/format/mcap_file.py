@@ -26,11 +26,13 @@ from actuated_characters.bags.format.storage import (
     OFFERED_QOS,
     SIMULATED,
     TYPE_HASH,
+    Beginning,
     StoredMessage,
     StoredTopic,
 )
 from msgs_config.errors import RecordingError
 
+_ALL = Beginning()
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # a record's kind, and the length of its content
 _MESSAGE_HEAD = struct.Struct(
@@ -113,8 +115,12 @@ class McapFile:
     def _is_indexed(self) -> bool:
         return bool(self._chunks) and len(self.topics) >= max(self._count, 1)
 
-    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
+    def messages_by_time(
+        self, names: Collection[str], beginning: Beginning = _ALL
+    ) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time; a chunk is unpacked when its time comes.
+
+        Chunks that end before the beginning are left out, but for topics that are read whole.
 
         Raises:
             ValueError: the file is damaged, or more than a limit would have to be held.
@@ -124,9 +130,11 @@ class McapFile:
             yield from sorted(self._all_messages())
             return
         chosen = {number for number, topic in self.topics.items() if topic.name in names}
+        whole = {number for number in chosen if self.topics[number].name in beginning.whole}
         pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
-            if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
+            wanted = chosen if index.message_end_time >= beginning.log_time_ns else whole
+            if index.message_index_offsets and not index.message_index_offsets.keys() & wanted:
                 continue
             start_ns = index.message_start_time
             ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)
