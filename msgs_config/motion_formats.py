@@ -25,8 +25,8 @@ _FOREIGN = {
     ".asf": ("a skeleton of Acclaim (ASF/AMC)", "convert both files to BVH, with amc2bvh say"),
     ".amc": ("a motion of Acclaim (ASF/AMC)", "convert both files to BVH, with amc2bvh say"),
     ".vmd": ("a motion of MikuMikuDance", _BY_BLENDER),
-    ".mcap": ("a recorded bag", "'actuated_characters motion export' takes it"),
-    ".db3": ("a recorded bag", "'actuated_characters motion export' takes it"),
+    ".mcap": ("a recorded bag", "'actuated_characters export' takes it"),
+    ".db3": ("a recorded bag", "'actuated_characters export' takes it"),
 }
 _SIGNATURES = {  # how files begin whose names say something else
     b"Kaydara FBX Binary": ".fbx",

@@ -206,7 +206,7 @@ def _what_it_is(types: Mapping[str, str]) -> str:
         return f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
     return (
         f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
-        "`motion export` take it with --character ROBOT.urdf --topic TOPIC"
+        "`export` take it with --character ROBOT.urdf --topic TOPIC"
     )
 
 

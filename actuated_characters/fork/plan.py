@@ -294,7 +294,7 @@ def _checked_settings(
                     why = "changes at a reset alone"
                 raise ConfigurationError(
                     f"parameter '{name}' of {node} {why}, so not in a fork; "
-                    f"'actuated_characters parameters {node}' says which are live"
+                    f"'actuated_characters run --parameters {node}' says which are live"
                 )
     return checked
 

@@ -239,12 +239,12 @@ def test_a_command_refuses_a_bomb_in_little_memory(
 
 
 @pytest.mark.parametrize("kind", ["chunk", "chunk that lies", "chunk of lz4"])
-def test_recover_keeps_the_rest_and_says_what_it_left(
+def test_a_recovery_keeps_the_rest_and_says_what_it_left(
     write: Callable[[str], Path], kind: str
 ) -> None:
     bag = write(kind)
 
-    ended = run("recover", bag)
+    ended = run("info", bag, "--recover")
 
     assert ended.code == 0, ended.errors
     assert KINDS[kind][1] in " ".join(ended.errors.split())
