@@ -367,7 +367,7 @@ def test_the_command_writes_a_file_and_a_table(
 
     code = main(
         [
-            *"motion reconstruct --clip=kick --worlds=2 --kept=1".split(),
+            *("motion", "reconstruct", "--clip=kick", "--worlds=2", "--kept=1"),
             f"--output={output}",
             *(f"--set=controller_node.{setting}" for setting in few),
         ]
