@@ -80,5 +80,5 @@ class SqliteFile:
                 yield StoredMessage(log_time_ns, published_ns, (place, 0), topic, raw)
         except sqlite3.DataError as error:
             raise limits.LimitError(
-                f"a message is larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
+                f"a message: larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
             ) from error
