@@ -23,7 +23,7 @@ KINDS = {  # name: content, what it is, what to do
     "robot.xml": (URDF, "the description of a robot (URDF)", "--character"),
     "model.xml": ("<!-- a --><mujoco model='m'/>", "a model of MuJoCo (MJCF)", "URDF"),
     "world.xml": ("<sdf version='1.9'/>", "a model or world of Gazebo (SDF)", "URDF"),
-    "other.xml": ("<launch/>", "an XML file", "URDF"),
+    "other.xml": ("<launch/>", "an XML file whose root is <launch>", "URDF"),
     "empty.xml": ("", "an XML file", "URDF"),
     "robot.urdf.xacro": ("<robot/>", "a xacro file", "--character"),
     "MODEL.SDF": ("<sdf/>", "a model or world of Gazebo (SDF)", "URDF"),

@@ -5,9 +5,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf.formats import check_suffix
+from msgs_config.character.urdf.formats import CHARACTER_FILE, URDF_SUFFIXES
 from msgs_config.errors import CharacterError
 from msgs_config.extras import require_extra
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.runtime.fork_safe import fork_safe_lock
 
 XACRO = ".xacro"
@@ -23,7 +24,7 @@ def read_urdf_text(path: Path, arguments: Mapping[str, str] | None = None) -> fi
     """
     if path.suffix.lower() == XACRO:
         return files.XmlText(_expand(path, arguments or {}), "")
-    check_suffix(path)
+    refuse_other_kind(path, CHARACTER_FILE, URDF_SUFFIXES, CharacterError)
     return files.read_xml(path, CharacterError)
 
 

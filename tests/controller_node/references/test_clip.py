@@ -517,12 +517,19 @@ def test_states_sampled_together_are_those_sampled_one_by_one(clip: str) -> None
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("walk.bvh", "a BVH file; 'actuated_characters motion import' makes a clip of it"),
-        ("WALK.BVH", "a BVH file"),
-        ("walk.fbx", "an FBX scene; convert it to BVH.*motion import"),
-        ("walk.npz", "arrays of NumPy.*motion import"),
+        (
+            "walk.bvh",
+            "a motion capture .BVH., .*; 'actuated_characters motion import' makes a clip",
+        ),
+        ("WALK.BVH", "a motion capture .BVH., .*motion import"),
+        ("walk.fbx", "an FBX scene, .*; Blender makes a .bvh .*motion import"),
+        ("walk.npz", "an archive of NumPy arrays.*motion import"),
     ],
 )
-def test_motion_that_is_no_clip_is_said_with_what_to_do(name: str, message: str) -> None:
-    with pytest.raises(ClipError, match=f"not a clip but {message}"):
-        read_clip(HUMANOID, name)
+def test_motion_that_is_no_clip_is_said_with_what_to_do(
+    name: str, message: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).touch()
+
+    with pytest.raises(ClipError, match=f"{name} is {message}"):
+        read_clip(HUMANOID, str(tmp_path / name))

@@ -90,15 +90,15 @@ def test_so_may_a_characters_file(tmp_path: Path, name: str) -> None:
 
 
 OTHERS = {
-    "robot.sdf": "is SDF",
-    "robot.WORLD": "is SDF",
-    "robot.mjcf": "is MJCF",
-    "robot.usda": "is USD",
-    "robot.srdf": "is SRDF",
+    "robot.sdf": "is a model or world of Gazebo (SDF)",
+    "robot.WORLD": "is a world of Gazebo (SDF)",
+    "robot.mjcf": "is a model of MuJoCo (MJCF)",
+    "robot.usda": "is a USD scene",
+    "robot.srdf": "is what MoveIt adds to a URDF (SRDF)",
     "robot.stl": "is a mesh",
-    "robot.fbx": "is a mesh",
-    "walk.bvh": "'motion import'",
-    "walk.npz": "is data",
+    "robot.fbx": "is an FBX scene",
+    "walk.bvh": "is a motion capture (BVH)",
+    "walk.npz": "is an archive of NumPy arrays",
 }
 
 
@@ -115,16 +115,15 @@ def test_a_file_of_another_format_is_named_as_what_it_is(
 
     line = refusal(yaml if key else file)
 
-    assert f"{file} {OTHERS[name]}" in line if name != "walk.bvh" else OTHERS[name] in line
-    assert "a character is a .urdf or .xacro file" in line
+    assert f"{file} {OTHERS[name]}" in line
+    assert "not a character, which is a .urdf or .xacro file" in line
 
 
 ROOTS = {
-    '<sdf version="1.7"><model name="m"/></sdf>': "is SDF",
-    '<mujoco model="m"><worldbody/></mujoco>': "is MJCF",
-    "<COLLADA/>": "is a mesh",
-    "<package/>": "is a ROS package's description",
-    "<other/>": "is XML whose root is <other>",
+    '<sdf version="1.7"><model name="m"/></sdf>': "is a model or world of Gazebo (SDF)",
+    '<mujoco model="m"><worldbody/></mujoco>': "is a model of MuJoCo (MJCF)",
+    "<COLLADA/>": "is a mesh or scene (COLLADA)",
+    "<other/>": "is an XML file whose root is <other>",
     "<!DOCTYPE html>\n<html/>": "a web page, not the file itself",
 }
 
