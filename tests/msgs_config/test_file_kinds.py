@@ -17,6 +17,10 @@ POINTER = (
 URDF = "<?xml version='1.0'?>\n<!-- <mujoco> -->\n<robot name='r'><link name='a'/></robot>"
 KINDS = {  # name: content, what it is, what to do
     "walk.fbx": ("Kaydara FBX Binary  \0", "an FBX scene", "motion import"),
+    "disguised.yaml": ("; FBX 7.4.0 project file", "an FBX scene", "motion import"),
+    "unknown.kind": ("PK\3\4", "an archive of NumPy arrays", "motion import"),
+    "A.C3D": ("\2P", "a motion capture (C3D)", "motion import"),
+    "robot.usda": ("#usda 1.0", "a USD scene", "URDF"),
     "walk.bvh": ("HIERARCHY\nROOT Hips\n", "a motion capture (BVH)", "motion import"),
     "walk.npz": ("PK\3\4", "an archive of NumPy arrays", "motion import"),
     "robot.urdf": (URDF, "the description of a robot (URDF)", "--character"),

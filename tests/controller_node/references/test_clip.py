@@ -514,22 +514,9 @@ def test_states_sampled_together_are_those_sampled_one_by_one(clip: str) -> None
         assert all(ours.tobytes() == its.tobytes() for ours, its in pairs)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        (
-            "walk.bvh",
-            "a motion capture .BVH., .*; 'actuated_characters motion import' makes a clip",
-        ),
-        ("WALK.BVH", "a motion capture .BVH., .*motion import"),
-        ("walk.fbx", "an FBX scene, .*; Blender makes a .bvh .*motion import"),
-        ("walk.npz", "an archive of NumPy arrays.*motion import"),
-    ],
-)
-def test_motion_that_is_no_clip_is_said_with_what_to_do(
-    name: str, message: str, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("name", ["walk.bvh", "WALK.BVH", "walk.fbx"])
+def test_motion_that_is_no_clip_is_said_with_what_to_do(name: str, tmp_path: Path) -> None:
     (tmp_path / name).touch()
 
-    with pytest.raises(ClipError, match=f"{name} is {message}"):
+    with pytest.raises(ClipError, match=f"{name} is .*, not a clip; .*motion import"):
         read_clip(HUMANOID, str(tmp_path / name))
