@@ -62,10 +62,16 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
     export.add_argument(
         "--output", type=Path, required=True, metavar="FILE", help=f"a {_suffixes()} file"
     )
+    export.add_argument("--overwrite", action="store_true", help="replace FILE")
     add_robot(
         export,
         "of a recording: which, where there are several; of a clip: whose it is (humanoid)",
     )
+    _add_options_of_formats(export)
+
+
+def _add_options_of_formats(export: argparse.ArgumentParser) -> None:
+    """Add the options of `_KNOWN_TO`."""
     export.add_argument(
         "--reference",
         action="store_true",
@@ -84,7 +90,6 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
     export.add_argument("--units", choices=("m", "cm"), help="BVH: unit of length (m)")
     export.add_argument("--order", choices=_ORDERS, help="BVH: order of rotation channels (ZXY)")
     export.add_argument("--ground", action="store_true", help="glTF: the plane z = 0, too")
-    export.add_argument("--overwrite", action="store_true", help="replace FILE")
 
 
 def _suffixes() -> str:
