@@ -32,26 +32,20 @@ def _expand(path: Path, arguments: Mapping[str, str]) -> str:
     files.read_xml(path, CharacterError)  # raises an error that names what is no file, or too large
     require_extra("xacro", f"{path}: to expand a xacro", CharacterError)
     import xacro
-    from ament_index_python import packages
+    from xacro import substitution_args
 
-    def find(package_name: str, print_warning: bool = True) -> str:
-        del print_warning
-        return _find_package(package_name, path.absolute())
-
+    file = path.absolute()
     with _xacro_lock:
-        # xacro asks this function for the packages of `$(find NAME)`
-        usual, packages.get_package_share_directory = packages.get_package_share_directory, find
+        usual = substitution_args._eval_find  # of `$(find NAME)`: in installed ROS packages alone
+        substitution_args._eval_find = lambda name: _find_package(name, file)
         try:
-            document = xacro.process_file(
-                str(path.absolute()), mappings=dict(arguments), verbosity=0
-            )
-            return str(document.toxml())
+            return str(xacro.process_file(str(file), mappings=dict(arguments), verbosity=0).toxml())
         except Exception as error:  # whatever an expression in the file raises
             reason = (" ".join(str(error).split()) or type(error).__name__)[:500]
             remedy = "; the key 'xacro' of a .yaml file gives arguments" * ("argument" in reason)
             raise CharacterError(f"{path}: xacro: {reason}{remedy}") from error
         finally:
-            packages.get_package_share_directory = usual
+            substitution_args._eval_find = usual
 
 
 def _find_package(name: str, near: Path) -> str:
