@@ -1,11 +1,11 @@
 """The messages of a bag, by the character or the world that they are of."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.reader import RecordedMessage
 from actuated_characters.bags.tracks import CharacterTimeline, WorldTimeline
 from msgs_config.errors import ActuatedCharactersError
 
@@ -20,13 +20,15 @@ def naming(bag: Path, timeline: CharacterTimeline | WorldTimeline) -> Iterator[N
         raise type(error)(f"recording {where}: {error}") from error
 
 
-def collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
-    """Collect the messages of each namespace, on topics that have the contract's names."""
+def collect(
+    bag: Path, messages: Iterable[RecordedMessage]
+) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
+    """Collect the messages of a bag by namespace, on topics that have the contract's names."""
     characters: dict[str, CharacterTimeline] = {}
     worlds: dict[str, WorldTimeline] = {}
     # by topic: the timeline of its namespace, and the topic's name in that
     places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
-    for message in read_messages(bag):
+    for message in messages:
         topic = message.topic
         if topic not in places:
             places[topic] = _timeline(topic, WorldTimeline, worlds) or _timeline(

@@ -1,6 +1,6 @@
 """Reads the recordings of characters from a bag, as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -12,7 +12,7 @@ from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
-from actuated_characters.bags.reader import read_topics
+from actuated_characters.bags.reader import read_messages, read_topics
 from actuated_characters.bags.rebuilding import RecordedWorld
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
@@ -177,13 +177,20 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
         ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
-    characters, worlds = collect(bag)
+    return make_recordings(bag, *collect(bag, read_messages(bag)))
+
+
+def make_recordings(
+    bag: Path, characters: Iterable[CharacterTimeline], worlds: Mapping[str, WorldTimeline]
+) -> tuple[Recording, ...]:
+    """Make recordings of what was collected from a bag.
+
+    Raises:
+        RecordingError: see `read_recordings`.
+    """
     known = [timeline for timeline in characters if timeline.rebuilt is not None]
     if not known:
-        raise RecordingError(
-            f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
-            f"which says what its states mean; {_what_it_is(read_topics(bag))}"
-        )
+        raise RecordingError(describe_foreign(bag, read_topics(bag)))
     recordings = []
     for timeline in known:
         with naming(bag, timeline):
@@ -191,14 +198,21 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     return tuple(sorted(recordings, key=_place))
 
 
-def _what_it_is(types: Mapping[str, str]) -> str:
-    """What can be done with a bag whose topics are of these types."""
+def describe_foreign(bag: Path, types: Mapping[str, str]) -> str:
+    """What a bag is that is not of this project's simulator, and what can be done with it.
+
+    `types` are those of its topics.
+    """
     found = sorted(name for name, kind in types.items() if kind == JOINT_STATE)
-    if not found:
-        return f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    what = f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    if found:
+        what = (
+            f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
+            "`motion export` take it with --character ROBOT.urdf --topic TOPIC"
+        )
     return (
-        f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
-        "`motion export` take it with --character ROBOT.urdf --topic TOPIC"
+        f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
+        f"which says what its states mean; {what}"
     )
 
 

@@ -26,6 +26,7 @@ from actuated_characters.bags.format.storage import (
     OFFERED_QOS,
     SIMULATED,
     TYPE_HASH,
+    FileStatistics,
     StoredMessage,
     StoredTopic,
 )
@@ -65,7 +66,7 @@ class McapFile:
         """Whether there was something compressed."""
         self._schemas: dict[int, Schema] = {}
         self._chunks: list[ChunkIndex] = []
-        self._count = 0  # channels that the file's statistics count
+        self._statistics: Statistics | None = None  # the file's own
         self._names: Collection[str] | None = None  # topics that are read; None: all
 
     @property
@@ -111,7 +112,46 @@ class McapFile:
 
     @property
     def _is_indexed(self) -> bool:
-        return bool(self._chunks) and len(self.topics) >= max(self._count, 1)
+        count = 0 if self._statistics is None else self._statistics.channel_count
+        return bool(self._chunks) and len(self.topics) >= max(count, 1)
+
+    def statistics(self) -> FileStatistics:
+        """The file's own statistics; those of one that has none are counted message by message.
+
+        Raises:
+            ValueError, KeyError: the file is damaged.
+        """
+        counts, known = Counter[str](), self._statistics
+        if known is not None:
+            for channel, count in known.channel_message_counts.items():
+                counts[self.topics[channel].name] += count
+            return FileStatistics(counts, known.message_start_time, known.message_end_time)
+        first_ns = last_ns = 0
+        for message in self.messages():
+            first_ns = min(first_ns, message.log_time_ns) if counts else message.log_time_ns
+            last_ns = max(last_ns, message.log_time_ns)
+            counts[message.topic.name] += 1
+        self._check_whole()
+        return FileStatistics(counts, first_ns, last_ns)
+
+    def last_message(self, name: str) -> StoredMessage | None:
+        """The last message on a topic; None without any. Unpacks no more than its chunk.
+
+        Raises:
+            ValueError: the file is damaged, or more than a limit would have to be held.
+        """
+        self._names = [name]
+        if not self._is_indexed:
+            return max(self._all_messages(), default=None)
+        for index in sorted(self._chunks, key=lambda each: each.message_end_time, reverse=True):
+            if self._may_hold(index, [name]) and (messages := self._read_chunk(index)):
+                return max(messages)
+        return None
+
+    def _may_hold(self, index: ChunkIndex, names: Collection[str]) -> bool:
+        """Whether a chunk may have messages on some topics, by its index."""
+        held = index.message_index_offsets or self.topics  # a writer may leave the offsets out
+        return any(self.topics[each].name in names for each in held if each in self.topics)
 
     def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time; a chunk is unpacked when its time comes.
@@ -123,10 +163,9 @@ class McapFile:
         if not self._is_indexed:
             yield from sorted(self._all_messages())
             return
-        chosen = {number for number, topic in self.topics.items() if topic.name in names}
         pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
-            if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
+            if not self._may_hold(index, names):
                 continue
             start_ns = index.message_start_time
             ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)
@@ -255,7 +294,7 @@ class McapFile:
             elif isinstance(record, ChunkIndex):
                 self._chunks.append(record)
             elif isinstance(record, Statistics):
-                self._count = record.channel_count
+                self._statistics = record
 
 
 class _CutOffError(ValueError):

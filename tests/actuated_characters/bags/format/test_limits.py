@@ -229,9 +229,13 @@ COMMANDS = {
 def test_a_command_refuses_a_bomb_in_little_memory(
     write: Callable[[str], Path], tmp_path: Path, command: str, kind: str
 ) -> None:
-    output = {"report": ["--output", tmp_path / "to"], "export": ["--output", tmp_path / "to.csv"]}
+    options: dict[str, list[object]] = {
+        "info": ["--ticks"],
+        "report": ["--output", tmp_path / "to"],
+        "export": ["--output", tmp_path / "to.csv"],
+    }
 
-    ended = run(command, write(kind), *output.get(command, []))
+    ended = run(command, write(kind), *options.get(command, []))
 
     assert ended.code == 1, ended.errors
     assert KINDS[kind][1] in ended.errors
