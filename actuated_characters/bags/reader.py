@@ -124,12 +124,6 @@ class OpenBag:
         for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
             yield self._unpacked(message)
 
-    def last_message(self, topic: str) -> RecordedMessage | None:
-        """The last message on a topic, without reading many others; None without any."""
-        found = [last for file in self._files if (last := file.last_message(topic)) is not None]
-        last = max(found, key=lambda each: each.log_time_ns, default=None)
-        return None if last is None else self._unpacked(last)
-
     def _unpacked(self, message: storage.StoredMessage) -> RecordedMessage:
         log_time_ns, published_ns, _, topic, stored, _ = message
         packed = self.metadata.compression_mode == metadata.MESSAGE

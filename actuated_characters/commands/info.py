@@ -61,7 +61,7 @@ def _info(options: argparse.Namespace) -> None:
         print(json.dumps(content, indent=2, allow_nan=False))
         return
     console = Console()
-    console.print(make_facts_table(contents.bag, _bag_rows(contents)))
+    console.print(make_facts_table(contents.bag, _bag_rows(contents, options.ticks)))
     console.print(_topics_table(contents))
     for character in contents.characters:
         rows = _character_rows(character)
@@ -78,7 +78,7 @@ def _title(name: str, what: str) -> str:
     return f"{name}: {what}" if name else what
 
 
-def _bag_rows(contents: "Contents") -> Iterator[tuple[str, str]]:
+def _bag_rows(contents: "Contents", exact: bool) -> Iterator[tuple[str, str]]:
     files = ", ".join(f"{name} ({_size(size)})" for name, size in contents.files.items())
     yield "files", f"{_size(contents.size_bytes)}: {files}"
     version = "unknown" if contents.metadata_version is None else str(contents.metadata_version)
@@ -94,7 +94,8 @@ def _bag_rows(contents: "Contents") -> Iterator[tuple[str, str]]:
         yield "begun", start.strftime("%Y-%m-%d %H:%M:%S UTC")
     unknown = "unknown, log times are simulated; of MCAP --ticks reads the others"
     yield "wall time", _seconds(contents.wall_time_s) or unknown
-    yield "simulated time", _seconds(contents.sim_time_s) or "unknown"
+    about = "" if exact or contents.sim_time_s is None else "about "
+    yield "simulated time", about + (_seconds(contents.sim_time_s) or "unknown")
 
 
 def _seconds(time: float | None) -> str:
@@ -107,7 +108,9 @@ def _topics_table(contents: "Contents") -> Table:
         columns.append("largest gap (s)")
     rows = []
     for topic in contents.topics:
-        numbers = (topic.count, topic.rate_wall_hz, topic.rate_sim_hz, topic.largest_gap_s)
+        times = (contents.wall_time_s, contents.sim_time_s)
+        rates = (topic.count / time if time else None for time in times)
+        numbers = (topic.count, *rates, topic.largest_gap_s)
         name = Text.assemble(topic.name, "\n  ", (topic.type, "dim"))
         rows.append([name, *map(show, numbers[: len(columns) - 1])])
     return make_table("topics", columns, rows)
@@ -119,8 +122,7 @@ def _character_rows(character: "CharacterContents") -> Iterator[tuple[str, str]]
         f"{character.character}, {character.degrees_of_freedom} degrees of freedom, "
         f"{character.mass:.4g} kg, {character.rate_hz} Hz, {character.mode or 'mode unknown'}",
     )
-    if character.ticks is not None:
-        yield "ticks", f"{character.ticks}, {_seconds(character.sim_time_s)}"
+    yield "states", str(character.states)
     yield "law", character.law or "not recorded"
     if character.versions:
         yield "versions", ", ".join(map(" ".join, character.versions.items()))

@@ -5,9 +5,9 @@ They come from the statistics of its files, its metadata, and a few messages of 
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from mcap.stream_reader import StreamReader
 
 from actuated_characters.bags.format.metadata import storage_of
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
-from actuated_characters.bags.reader import OpenBag, RecordedMessage, open_bag
+from actuated_characters.bags.reader import OpenBag, open_bag
 from actuated_characters.bags.recording import describe_foreign, find_bag
 from actuated_characters.bags.robots.reading import is_own
 from actuated_characters.recorder.forked_from import KEY, ForkedFrom, read_forked_from
@@ -28,7 +28,6 @@ from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.configuration import RunConfiguration
-from msgs_config.messages.joint_state import JointStateDecoder
 
 _STATES = topics.JOINT_STATES.name
 _SIMULATOR = topics.CONFIGURATION.of(topics.SIM_NODE).name
@@ -42,8 +41,6 @@ class TopicContents:
     name: str
     type: str  # such as "sensor_msgs/msg/JointState"
     count: int
-    rate_wall_hz: float | None = None  # None: wall times are not known
-    rate_sim_hz: float | None = None  # None: simulated time is not known
     largest_gap_s: float | None = None  # s of wall time; None unless each message was read
 
 
@@ -71,8 +68,7 @@ class CharacterContents:
     versions: dict[str, str]
     law: str | None  # None: no controller said it
     gains: list[GainsInForce]
-    ticks: int | None = None  # from the first state to the last, those that are missing included
-    sim_time_s: float | None = None
+    states: int  # messages; a state that was published again counts again
 
 
 @dataclass(frozen=True)
@@ -89,18 +85,10 @@ class Contents:
     forked_from: ForkedFrom | None
     start_ns: int | None  # wall time of the first message
     wall_time_s: float | None  # from the first message to the last
-    sim_time_s: float | None  # from the first state to the last
+    sim_time_s: float | None  # by the number of states, or exactly if each message was read
     topics: tuple[TopicContents, ...]  # by name
     characters: tuple[CharacterContents, ...]  # by name
     lacks: str | None  # why nothing more is known
-
-    def with_wall_times(self, start_ns: int | None, wall_time_s: float | None) -> "Contents":
-        """With the rates that follow from times of the wall clock, or without any."""
-        rated = [
-            replace(topic, rate_wall_hz=topic.count / wall_time_s if wall_time_s else None)
-            for topic in self.topics
-        ]
-        return replace(self, start_ns=start_ns, wall_time_s=wall_time_s, topics=tuple(rated))
 
 
 def read_contents(path: Path) -> Contents:
@@ -113,19 +101,14 @@ def read_contents(path: Path) -> Contents:
     with open_bag(path) as bag:
         metadata, types, counted = bag.metadata.content, bag.types, bag.statistics()
         texts = _first_texts(bag)
-        ends = {
-            name: (next(bag.messages([name]), None), bag.last_message(name))
-            for name in (topic.removesuffix(_SIMULATOR) + _STATES for topic in texts)
-            if name in types
-        }
-    characters = tuple(_characters(texts, ends))
-    sim_time = max((each.sim_time_s for each in characters if each.sim_time_s), default=None)
-    types = {**_listed_topics(metadata), **types}
-    counts = {name: counted.counts.get(name, 0) for name in sorted(types)}
+    characters = tuple(_characters(texts, counted.counts))
+    lengths = [(each.states - 1) / each.rate_hz for each in characters if each.states]
     inside = sorted(path.iterdir()) if path.is_dir() else [path]
     files = {file.name: file.stat().st_size for file in inside if file.is_file()}
     version, custom = metadata.get("version"), metadata.get("custom_data")
-    contents = Contents(
+    has_times = bool(counted.counts) and not bag.has_simulated_log_times
+    span = (counted.last_ns - counted.first_ns) / NANOSECONDS_PER_SECOND
+    return Contents(
         bag=str(path),
         files=files,
         size_bytes=sum(files.values()),
@@ -134,22 +117,16 @@ def read_contents(path: Path) -> Contents:
         metadata_version=version if isinstance(version, int) else None,
         ros_distro=str(metadata.get("ros_distro") or "unknown"),
         forked_from=read_forked_from(custom.get(KEY)) if isinstance(custom, dict) else None,
-        start_ns=None,
-        wall_time_s=None,
-        sim_time_s=sim_time,
+        start_ns=counted.first_ns if has_times else None,
+        wall_time_s=span if has_times else None,
+        sim_time_s=max(lengths, default=None),
         topics=tuple(
-            TopicContents(
-                name, types[name], count, rate_sim_hz=count / sim_time if sim_time else None
-            )
-            for name, count in counts.items()
+            TopicContents(name, kind, counted.counts.get(name, 0))
+            for name, kind in sorted({**_listed_topics(metadata), **types}.items())
         ),
         characters=characters,
         lacks=None if characters else _what_is_lacking(path, types),
     )
-    if bag.has_simulated_log_times or not counted.counts:
-        return contents
-    span_ns = counted.last_ns - counted.first_ns
-    return contents.with_wall_times(counted.first_ns, span_ns / NANOSECONDS_PER_SECOND)
 
 
 def _what_is_lacking(bag: Path, types: Mapping[str, str]) -> str:
@@ -173,53 +150,39 @@ def _first_texts(bag: OpenBag) -> dict[str, str]:
     return texts
 
 
-def _characters(
-    texts: Mapping[str, str], ends: Mapping[str, tuple[RecordedMessage | None, ...]]
-) -> Iterator[CharacterContents]:
+def _characters(texts: Mapping[str, str], counts: Mapping[str, int]) -> Iterator[CharacterContents]:
     """The characters whose simulators have said what they are.
 
     Args:
         texts: Configurations of simulators and controllers, by topic.
-        ends: First and last message by topic of states.
+        counts: Numbers of messages, by topic.
     """
     for topic, text in texts.items():
         below = topic.removesuffix(_SIMULATOR)
         if f"/{topic}".endswith(f"/{_SIMULATOR}"):
             with suppress(MessageError, ConfigurationError):  # it is another maker's
+                known = configuration.parse(text)
                 controller = _parameters(texts.get(below + _CONTROLLER, ""))
-                stamps = _stamps(ends.get(below + _STATES, ()))
-                yield _describe(below.strip("/"), configuration.parse(text), controller, stamps)
+                mode = known.parameters.get("mode")
+                yield CharacterContents(
+                    name=below.strip("/"),
+                    character=known.character,
+                    degrees_of_freedom=known.layout.size,
+                    mass=known.mass,
+                    rate_hz=_rate(known),
+                    mode=mode if isinstance(mode, str) else None,
+                    versions=known.versions,
+                    law=describe_law(controller),
+                    gains=_gains(controller, known.layout) if controller else [],
+                    states=counts.get(below + _STATES, 0),
+                )
 
 
-def _stamps(messages: Iterable[RecordedMessage | None]) -> list[int]:
-    """The stamps of states, ns; none where they cannot be read."""
-    with suppress(MessageError):
-        return [JointStateDecoder().decode(each.raw).stamp_ns for each in messages if each]
-    return []
-
-
-def _describe(
-    name: str, known: RunConfiguration, controller: Mapping[str, Any], stamps: Sequence[int]
-) -> CharacterContents:
-    """What the parameters at the start say; `stamps` are of its first and last state, ns."""
-    rate, mode = known.parameters.get("rate"), known.parameters.get("mode")
+def _rate(known: RunConfiguration) -> int:
+    rate = known.parameters.get("rate")
     if not isinstance(rate, int):
         raise MessageError(f"the simulator's 'rate' is {rate}, not a number")
-    clock = TickClock(rate)
-    ticks = [clock.first_tick_from(stamp) for stamp in stamps]
-    return CharacterContents(
-        name=name,
-        character=known.character,
-        degrees_of_freedom=known.layout.size,
-        mass=known.mass,
-        rate_hz=rate,
-        mode=mode if isinstance(mode, str) else None,
-        versions=known.versions,
-        law=describe_law(controller),
-        gains=_gains(controller, known.layout) if controller else [],
-        ticks=ticks[1] - ticks[0] if ticks else None,
-        sim_time_s=(stamps[1] - stamps[0]) / NANOSECONDS_PER_SECOND if stamps else None,
-    )
+    return TickClock(rate).rate_hz
 
 
 def _parameters(text: str) -> dict[str, Any]:

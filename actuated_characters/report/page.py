@@ -24,7 +24,7 @@ table { border-collapse: collapse; margin: .7rem 0; }
 caption { text-align: left; font-weight: 600; padding: .3rem 0; white-space: nowrap; }
 th, td { border-bottom: 1px solid var(--line); padding: .15rem .9rem .15rem 0;
          text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
-th:first-child, td:first-child, table.facts td { text-align: left; }
+th:first-child, td:first-child, td:nth-child(2):last-child { text-align: left; }
 tr:nth-child(even) td { background: var(--soft); }
 img { max-width: 100%; height: auto; background: white; border-radius: 6px; }
 figure { margin: .7rem 0; } figcaption { font-size: .85rem; opacity: .75; }
@@ -68,40 +68,24 @@ class Section:
     remarks: Sequence[str] = ()
     verdict: str = ""  # a sentence after the pictures
     tiles: Sequence[tuple[str, str]] = ()  # name and value of figures that belong to the verdict
+    chapter: str = ""  # a heading above, where a chapter begins
 
 
-@dataclass(frozen=True)
-class Chapter:
-    """All sections of one character."""
-
-    title: str  # "" for no heading
-    sections: Sequence[Section]
-
-
-def render_page(title: str, chapters: Sequence[Chapter], footer: Sequence[tuple[str, str]]) -> str:
-    """The page as HTML; all texts are escaped. `footer` has commands, and what they show."""
-    body = "".join(map(_chapter, chapters))
-    rows = "".join(
-        f"<tr><td><code>{escape(command)}</code></td><td>{escape(shown)}</td></tr>\n"
-        for command, shown in footer
-    )
+def render_page(title: str, sections: Sequence[Section]) -> str:
+    """The page as HTML; all texts are escaped."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
         f"{GENERATOR}/>\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n{body}"
-        f'<h3>the rest</h3>\n<table class="facts">\n{rows}</table>\n</body>\n</html>\n'
+        f"<h1>{escape(title)}</h1>\n{''.join(map(_section, sections))}</body>\n</html>\n"
     )
 
 
-def _chapter(chapter: Chapter) -> str:
-    head = f"<h2>{escape(chapter.title)}</h2>\n" if chapter.title else ""
-    return head + "".join(map(_section, chapter.sections))
-
-
 def _section(section: Section) -> str:
-    parts = [f"<h3>{escape(section.title)}</h3>\n"] if section.title else []
+    parts = [f"<h2>{escape(section.chapter)}</h2>\n"] if section.chapter else []
+    if section.title:
+        parts.append(f"<h3>{escape(section.title)}</h3>\n")
     parts += map(_figure, section.illustrations)
     if section.verdict:
         parts.append(f'<p class="verdict">{escape(section.verdict)}</p>\n')

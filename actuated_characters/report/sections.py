@@ -42,9 +42,12 @@ _STATISTICS = ("mean", f"{_PERCENTILE} %", "largest")
 class CharacterReport:
     """Makes the sections of one recording."""
 
-    def __init__(self, recording: Recording, prefix: str = "", stills: int = STILLS) -> None:
-        """`prefix` comes before the names of the pictures; `stills` is the number of poses."""
+    def __init__(
+        self, recording: Recording, prefix: str = "", stills: int = STILLS, chapter: str = ""
+    ) -> None:
+        """`prefix` comes before names of pictures; `stills` are poses; `chapter` is a heading."""
         self._recording, self._prefix, self._stills = recording, prefix, stills
+        self._chapter = chapter
         self._kinds = vector_kinds(recording.layout)
         self._names = recording.character.vector_names
         self._events = self._measured_events()
@@ -73,7 +76,8 @@ class CharacterReport:
 
     def _result(self) -> Section:
         pictures, remarks = self._strip()
-        return Section("", pictures, remarks=remarks, verdict=self._verdict(), tiles=self._tiles())
+        verdict, shown = self._verdict(), self._tiles()
+        return Section("", pictures, [], remarks, verdict, shown, self._chapter)
 
     def _verdict(self) -> str:
         controller = self._recording.controller

@@ -84,6 +84,20 @@ class _Gaps:
             yield message
         self.is_complete = True
 
+    def added_to(self, contents: Contents) -> Contents:
+        """The contents with largest gaps and wall times, as far as these are known."""
+        if not self.has_wall_times or not self.last_ns:
+            return contents
+        gaps = {name: gap_ns / NANOSECONDS_PER_SECOND for name, gap_ns in self.largest_ns.items()}
+        return replace(
+            contents,
+            start_ns=self.first_ns,
+            wall_time_s=(self.last_ns - self.first_ns) / NANOSECONDS_PER_SECOND,
+            topics=tuple(
+                replace(each, largest_gap_s=gaps.get(each.name)) for each in contents.topics
+            ),
+        )
+
 
 def read_ticks(contents: Contents) -> tuple[Contents, list[TickFacts]]:
     """Read all messages of a bag: its contents with what follows from them, and the ticks.
@@ -109,20 +123,12 @@ def read_ticks(contents: Contents) -> tuple[Contents, list[TickFacts]]:
         for timeline in timelines
         if timeline.rebuilt is not None and len(timeline.states.stamps_ns)
     ]
-    return _with_gaps(replace(contents, lacks=lacks), gaps), facts
-
-
-def _with_gaps(contents: Contents, gaps: _Gaps) -> Contents:
-    if not gaps.has_wall_times or not gaps.last_ns:
-        return contents
-    named = [
-        replace(topic, largest_gap_s=gaps.largest_ns[topic.name] / NANOSECONDS_PER_SECOND)
-        if topic.name in gaps.largest_ns
-        else topic
-        for topic in contents.topics
-    ]
-    span = (gaps.last_ns - gaps.first_ns) / NANOSECONDS_PER_SECOND
-    return replace(contents, topics=tuple(named)).with_wall_times(gaps.first_ns, span)
+    whole = replace(
+        contents,
+        sim_time_s=max((each.sim_time_s for each in facts), default=contents.sim_time_s),
+        lacks=lacks,
+    )
+    return gaps.added_to(whole), facts
 
 
 def _facts(timeline: CharacterTimeline, recording: Recording | None) -> TickFacts:

@@ -7,7 +7,7 @@ from pathlib import Path
 from actuated_characters.bags.recording import Recording, find_bag
 from actuated_characters.bags.robots.reading import RobotRecording, RobotSource, read_any
 from actuated_characters.recorder.run_directory import REPORT
-from actuated_characters.report.page import GENERATOR, Chapter, render_page
+from actuated_characters.report.page import GENERATOR, Section, Table, render_page
 from actuated_characters.report.robot_sections import POSITIONS, RobotReport
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
 from msgs_config.errors import RecordingError
@@ -56,32 +56,31 @@ def write_report(
     reports = _plan_reports(recordings, stills)
     done, total = 0, sum(len(report.makers) for report in reports)
     progress(done, total)
-    chapters, files = list[Chapter](), dict[str, bytes]()
-    for recording, report in zip(recordings, reports, strict=True):
-        sections = []
+    sections, files = list[Section](), dict[str, bytes]()
+    for report in reports:
         for make in report.makers:
             sections.append(make())
             files |= {f"{each.name}.png": each.png for each in sections[-1].illustrations}
             progress(done := done + 1, total)
-        title = recording.name or recording.character.name
-        chapters.append(Chapter(title if len(recordings) > 1 else "", sections))
     which = "".join(f" --{name} {value}" for name, value in vars(source).items() if value)
     rest = [
         (f"actuated_characters view {path}{which}", "the motion, its reference, plots over time"),
         (f"actuated_characters info {path} --ticks", "topics, gains, times between messages"),
     ]
-    page = render_page(", ".join(report.title for report in reports), chapters, rest)
+    sections.append(Section("the rest", tables=[Table(rest, ("command", "shows"))]))
+    page = render_page(", ".join(report.title for report in reports), sections)
     _write(directory, {PAGE: page.encode("utf-8")} | files)
     return directory / PAGE
 
 
 def _plan_reports(recordings: Sequence[Recording], stills: int) -> list[CharacterReport]:
-    """The report of each character; of several, each file's name has the character's in it."""
+    """The report of each character; of several, each is a chapter, and named in its files."""
     reports = []
     for number, recording in enumerate(recordings, start=1):
-        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
+        name = recording.name if len(recordings) > 1 else ""
+        prefix = f"{number}-{_UNFIT.sub('_', name)}-" if name else ""
         kind = RobotReport if isinstance(recording, RobotRecording) else CharacterReport
-        reports.append(kind(recording, prefix, stills))
+        reports.append(kind(recording, prefix, stills, chapter=name))
     return reports
 
 

@@ -134,25 +134,6 @@ class McapFile:
         self._check_whole()
         return FileStatistics(counts, first_ns, last_ns)
 
-    def last_message(self, name: str) -> StoredMessage | None:
-        """The last message on a topic; None without any. Unpacks no more than its chunk.
-
-        Raises:
-            ValueError: the file is damaged, or more than a limit would have to be held.
-        """
-        self._names = [name]
-        if not self._is_indexed:
-            return max(self._all_messages(), default=None)
-        for index in sorted(self._chunks, key=lambda each: each.message_end_time, reverse=True):
-            if self._may_hold(index, [name]) and (messages := self._read_chunk(index)):
-                return max(messages)
-        return None
-
-    def _may_hold(self, index: ChunkIndex, names: Collection[str]) -> bool:
-        """Whether a chunk may have messages on some topics, by its index."""
-        held = index.message_index_offsets or self.topics  # a writer may leave the offsets out
-        return any(self.topics[each].name in names for each in held if each in self.topics)
-
     def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time; a chunk is unpacked when its time comes.
 
@@ -163,9 +144,10 @@ class McapFile:
         if not self._is_indexed:
             yield from sorted(self._all_messages())
             return
+        chosen = {number for number, topic in self.topics.items() if topic.name in names}
         pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
-            if not self._may_hold(index, names):
+            if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
                 continue
             start_ns = index.message_start_time
             ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)

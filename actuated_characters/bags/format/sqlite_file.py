@@ -70,25 +70,17 @@ class SqliteFile:
         first_ns = min((each for *_, each, _ in rows), default=0)
         return FileStatistics(counts, first_ns, max((each for *_, each in rows), default=0))
 
-    def last_message(self, name: str) -> StoredMessage | None:
-        """The last message on a topic; None without any. Raises as `messages_by_time`."""
-        return next(self._messages([name], "DESC"), None)
-
     def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time.
 
         Raises:
             ValueError, sqlite3.Error: the file is damaged, or a message is too large.
         """
-        return self._messages(names, "ASC")
-
-    def _messages(self, names: Collection[str], order: str) -> Iterator[StoredMessage]:
         chosen = [number for number, topic in self.topics.items() if topic.name in names]
         try:
             for number, log_time_ns, place, raw in self._tables.execute(
                 "SELECT topic_id, timestamp, id, CAST(data AS BLOB) FROM messages "
-                f"WHERE topic_id IN ({', '.join('?' * len(chosen))}) "
-                f"ORDER BY timestamp {order}, id {order}",
+                f"WHERE topic_id IN ({', '.join('?' * len(chosen))}) ORDER BY timestamp, id",
                 chosen,
             ):
                 topic = self.topics[number]

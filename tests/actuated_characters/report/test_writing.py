@@ -23,7 +23,7 @@ from actuated_characters.metrics.recording_metrics import contact_series, measur
 from actuated_characters.metrics.run_metrics import Measurement
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.report.decimation import decimated, span_maxima
-from actuated_characters.report.page import NOT_KNOWN, Chapter, Section, Table, render_page
+from actuated_characters.report.page import NOT_KNOWN, Section, Table, render_page
 from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
 from msgs_config.errors import RecordingError
@@ -340,19 +340,19 @@ def test_a_bag_of_something_else_is_one_line(
 
 def test_texts_are_escaped_wherever_they_are() -> None:
     evil = "<img src=x onerror=alert(1)>\"'&"
-    section = Section(evil, tables=[Table([(evil,)], (evil,), evil)], remarks=[evil])
+    section = Section(evil, tables=[Table([(evil,)], (evil,), evil)], remarks=[evil], chapter=evil)
 
-    page = Page(render_page(evil, [Chapter(evil, [section])], [(evil, evil)]))
+    page = Page(render_page(evil, [section]))
 
     assert page.pictures == []
-    assert page.rows(evil) == [[evil], [evil], [evil, evil]]
+    assert page.rows(evil) == [[evil], [evil]]
     assert not re.search(r"onerror=alert\(1\)>", page.text)
 
 
 def test_a_column_without_a_value_is_left_out() -> None:
     table = Table([("a", NOT_KNOWN, "1"), ("b", NOT_KNOWN, NOT_KNOWN)], ("joint", "limit", "p"))
 
-    page = Page(render_page("page", [Chapter("", [Section("", tables=[table])])], []))
+    page = Page(render_page("page", [Section("", tables=[table])]))
 
     assert page.cells == [["joint", "p"], ["a", "1"], ["b", NOT_KNOWN]]
 
