@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
-from actuated_characters.metrics.error_measures import AT_LIMIT, centre_path, distances
+from actuated_characters.metrics.error_measures import (
+    AT_LIMIT,
+    centre_path,
+    distances,
+    follows_state,
+)
 from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series, Tick
 from msgs_config.arrays import BoolArray, FloatArray
@@ -37,8 +42,18 @@ class ContactSeries:
 
 
 def tracking_errors(recording: Recording) -> FloatArray:
-    """Distance (t + 1, b) of each vector from its reference, rad or m; NaN without a reference."""
-    return distances(recording.layout, recording.position, recording.reference_position)
+    """Distance (t + 1, b) of each vector from its reference, rad or m.
+
+    NaN without a reference, or where the reference is made of the state: see `follows_state`.
+    """
+    layout, position = recording.layout, recording.position
+    errors = distances(layout, position, recording.reference_position)
+    begins = np.zeros(len(position), dtype=np.bool_)
+    begins[recording.episode_rows] = True
+    moved = distances(layout, np.vstack((position[:1], position[:-1])), position)
+    before = np.zeros(errors.shape[1], dtype=np.bool_)
+    errors[follows_state(errors, moved, before, begins)] = np.nan
+    return errors
 
 
 def saturated_shares(shares: FloatArray) -> FloatArray:

@@ -48,6 +48,8 @@ class CharacterReport:
         """`prefix` comes before names of pictures; `stills` are poses; `chapter` is a heading."""
         self._recording, self._prefix, self._stills = recording, prefix, stills
         self._chapter = chapter
+        reference = recording.reference_position
+        self._has_reference = bool(np.isfinite(reference).all(axis=1).any())
         self._kinds = vector_kinds(recording.layout)
         self._names = recording.character.vector_names
         self._events = self._measured_events()
@@ -82,8 +84,7 @@ class CharacterReport:
     def _verdict(self) -> str:
         controller = self._recording.controller
         law = describe_law(controller[0].parameters) if controller else None
-        has_reference = bool(np.isfinite(self._recording.reference_position).any())
-        return describe_end(self._metrics, law, has_reference=has_reference)
+        return describe_end(self._metrics, law, has_reference=self._has_reference)
 
     def _tiles(self) -> list[tuple[str, str]]:
         return tiles(self._metrics)
@@ -93,21 +94,23 @@ class CharacterReport:
         recording = self._recording
         if not self._stills:
             return [], []
-        has_ghost = bool(np.isfinite(recording.reference_position).all(axis=1).any())
         try:
-            poses = strip(recording, self._stills, ghost=has_ghost and bool(recording.layout.size))
+            has_ghost = self._has_reference and bool(recording.layout.size)
+            poses = strip(recording, self._stills, ghost=has_ghost)
         except ActuatedCharactersError as error:
             return [], [f"The character cannot be drawn: {error}"]
         content = BytesIO()
         imsave(content, poses, format="png")
-        ghost = "; the reference is the ghost" if has_ghost else ""
+        ghost = "; the reference is the ghost" if self._has_reference else ""
         text = f"{recording.character.name}, evenly from the first state to the last{ghost}"
         return [Illustration(self._prefix + "strip", content.getvalue(), text)], []
 
     def _tracking(self) -> Section:
         title, errors = "tracking error", tracking_errors(self._recording)
         if np.isnan(errors).all():
-            return Section(title, remarks=["The recording has no reference."])
+            own = "Its reference is where it was itself, which tells no error."
+            remark = own if self._has_reference else "The recording has no reference."
+            return Section(title, remarks=[remark])
         columns = list(zip(self._names, self._kinds.units, errors.T, strict=True))
         rows = [(name, unit, *_statistics(values)) for name, unit, values in columns]
         table = Table(rows, ("joint", "unit", *_STATISTICS), "distance from the reference")

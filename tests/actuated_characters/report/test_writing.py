@@ -28,6 +28,7 @@ from actuated_characters.report.sections import NAMES
 from actuated_characters.report.writing import default_directory, write_report
 from msgs_config.errors import RecordingError
 from msgs_config.messages import configuration, topics
+from msgs_config.messages.state import StampedReference
 from msgs_config.messages.topic import STREAM, Topic
 from tests.support.bags import (
     Made,
@@ -235,6 +236,17 @@ def test_what_a_recording_lacks_is_said(tmp_path: Path) -> None:
         assert any(words in heading for heading in page.headings)
     assert (tmp_path / "bag-report" / "efforts.png").is_file()
     assert "A run of 0.05 s without a reference." in page.text and "root" not in page.headings
+
+
+def test_a_reference_that_is_the_state_tells_no_error(tmp_path: Path) -> None:
+    made = make_run("humanoid", 0.1)
+    own = [StampedReference(each.stamp_ns, each.position, each.velocity) for each in made.states]
+    messages = [*raw_states(made.plan, made.states), *raw_references(made.plan, own)]
+    bag = write_bag(tmp_path / "bag", [raw_configuration(made.plan), *messages])
+
+    page = Page(write_report(bag, stills=0).read_text(encoding="utf-8"))
+
+    assert "Its reference is where it was itself, which tells no error." in page.headings
 
 
 def test_one_state_is_enough(tmp_path: Path) -> None:
