@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType, IndexType
+from mcap.writer import CompressionType
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -133,35 +133,6 @@ def test_messages_are_not_read_to_be_counted(tmp_path: Path) -> None:
     assert {topic.name: topic.count for topic in contents.topics} == {"/a": 20, "/b": 10}
     with pytest.raises(RecordingError, match="it cannot be read whole"):
         read_ticks(contents)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"use_statistics": False}, {"index_types": IndexType.NONE}, {"use_chunking": False}],
-    ids=str,
-)
-def test_messages_are_counted_in_any_file(tmp_path: Path, options: dict[str, object]) -> None:
-    file = write_mcap(tmp_path / "from_foxglove.mcap", SENT, **options)  # type: ignore[arg-type]
-
-    contents = read_contents(file)
-
-    counts = {topic.name: topic.count for topic in contents.topics}
-    assert counts == {"/a": 20, "/b": 10}
-    assert (contents.start_ns, contents.wall_time_s) == (0, 29e-9)
-
-
-@pytest.mark.parametrize("suffix", ["mcap", "db3"])
-def test_the_files_of_a_split_bag_are_counted_together(tmp_path: Path, suffix: str) -> None:
-    names = [f"bag_{number}.{suffix}" for number in range(2)]
-    for name, part in zip(names, (SENT[10:], SENT[:10]), strict=True):
-        (write_mcap if suffix == "mcap" else write_humble_db3)(tmp_path / name, part)
-    storage = "mcap" if suffix == "mcap" else "sqlite3"
-    write_metadata(tmp_path, 9, storage, names, ["/a", "/b"])
-
-    contents = read_contents(tmp_path)
-
-    assert {topic.name: topic.count for topic in contents.topics} == {"/a": 20, "/b": 10}
-    assert (contents.start_ns, contents.wall_time_s) == (0, 29e-9)
 
 
 @pytest.mark.parametrize(
