@@ -11,15 +11,8 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.recording_metrics import push_spans
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
-PUSH, THROW, RESET, CHANGE, MODE, FALL = (
-    "push",
-    "ball let go",
-    "reset",
-    "parameter changed",
-    "mode",
-    "fall",
-)
-"""Kinds of events, as a legend names them."""
+PUSH, THROW, RESET, CHANGE, MODE, FALL = "push", "throw", "reset", "change", "mode", "fall"
+"""Kinds of events."""
 
 TRACK = "TRACK"
 """The mode in which the reference is tracked."""

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from shlex import quote
 
 from actuated_characters.bags.recording import Recording, find_bag
 from actuated_characters.bags.robots.reading import RobotRecording, RobotSource, read_any
@@ -62,10 +63,11 @@ def write_report(
             sections.append(make())
             files |= {f"{each.name}.png": each.png for each in sections[-1].illustrations}
             progress(done := done + 1, total)
-    which = "".join(f" --{name} {value}" for name, value in vars(source).items() if value)
+    which = "".join(f" --{name} {quote(value)}" for name, value in vars(source).items() if value)
+    run = quote(str(path))
     rest = [
-        (f"actuated_characters view {path}{which}", "the motion, its reference, plots over time"),
-        (f"actuated_characters info {path} --ticks", "topics, gains, times between messages"),
+        (f"actuated_characters view {run}{which}", "the motion, its reference, plots over time"),
+        (f"actuated_characters info {run} --ticks", "topics, gains, times between messages"),
     ]
     sections.append(Section("the rest", tables=[Table(rest, ("command", "shows"))]))
     page = render_page(", ".join(report.title for report in reports), sections)
