@@ -28,6 +28,8 @@ from msgs_config.shared_parameters import (
     COLLISION,
     COMMAND_DELAY,
     GRAVITY,
+    KEYFRAME,
+    KEYFRAME_PERIOD,
     PLACEMENT,
     RATE,
 )
@@ -88,6 +90,8 @@ PARAMETERS = [
         "largest horizontal force on the feet, as a share of the vertical one",
         live=True,
     ),
+    KEYFRAME_PERIOD,
+    KEYFRAME,
     SESSION,
     Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
     Parameter("gain_scale.d", 1.0, "factor on every joint's damping, not the root's", live=True),

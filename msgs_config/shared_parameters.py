@@ -39,6 +39,14 @@ PLACEMENT = Parameter(
     unit="m, m, m, rad",
     minimum=-1e12,
 )
+KEYFRAME_PERIOD = Parameter(
+    "keyframe_period",
+    5.0,
+    "of the keyframes from which a fork can begin; a large one comes less often; 0: none",
+    unit="s",
+    maximum=1e6,
+)
+KEYFRAME = Parameter("keyframe", "", "file of a keyframe, from which the run goes on")
 
 
 def collides(given: Mapping[str, object]) -> bool:

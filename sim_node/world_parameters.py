@@ -2,7 +2,14 @@
 
 from msgs_config.messages.session import SESSION
 from msgs_config.parameters import Parameter
-from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
+from msgs_config.shared_parameters import (
+    COMMAND_DELAY,
+    GRAVITY,
+    KEYFRAME,
+    KEYFRAME_PERIOD,
+    PLANE,
+    RATE,
+)
 from sim_node.frames import BASE_FRAME_PARAMETER, ODOM_FRAME
 
 _LARGEST_COUNT = 2**62
@@ -125,5 +132,7 @@ WORLD_PARAMETERS = [
     ),
     ODOM_FRAME,
     BASE_FRAME_PARAMETER,
+    KEYFRAME_PERIOD,
+    KEYFRAME,
     SESSION,
 ]

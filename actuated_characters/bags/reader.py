@@ -12,8 +12,11 @@ from actuated_characters.bags.format import limits, metadata, storage
 from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.bags.format.mcap_file import McapFile
 from actuated_characters.bags.format.sqlite_file import SqliteFile
+from actuated_characters.bags.format.storage import Beginning
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
+
+_ALL = Beginning()
 
 
 class RecordedMessage(NamedTuple):
@@ -46,7 +49,13 @@ class RecordedMessage(NamedTuple):
             ) from error
 
 
-def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
+def read_messages(
+    path: Path,
+    topics: Collection[str] | None = None,
+    *,
+    first_ns: int = 0,
+    whole: Collection[str] = (),
+) -> Iterator[RecordedMessage]:
     """Yield the messages of a recording, or those of `topics` only.
 
     They come in the order of their log times; those of equal time in that of their publishing, and
@@ -55,12 +64,16 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
     Args:
         path: A rosbag2 directory, or a single .mcap or .db3 file that is complete.
         topics: Names as they are in the recording.
+        first_ns: Log time from which on they are read.
+        whole: Names of topics that are read from the start nevertheless.
 
     Raises:
         RecordingError: There is no complete recording at `path`, or it has none of a topic's name.
     """
     with open_bag(path) as bag:
-        yield from bag.messages(topics)
+        for message in bag.messages(topics, Beginning(first_ns, frozenset(whole))):
+            if message.log_time_ns >= first_ns or message.topic in whole:
+                yield message
 
 
 def read_topics(path: Path) -> dict[str, str]:
@@ -110,15 +123,20 @@ class OpenBag:
             max((each.last_ns for each in found), default=0),
         )
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
-        """Yield messages as `read_messages` does; one such reading at a time."""
+    def messages(
+        self, topics: Collection[str] | None = None, beginning: Beginning = _ALL
+    ) -> Iterator[RecordedMessage]:
+        """Yield messages as `read_messages` does; one such reading at a time.
+
+        Some of those before the beginning may be among them.
+        """
         recorded = self.types.keys() | set(self.metadata.topics)
         names = recorded if topics is None else set(topics)
         if unknown := sorted(names - recorded):
             raise RecordingError(one_of("topic", unknown[0], sorted(recorded)))
         places = self.metadata.files
         streams = [
-            _read(self._path, place, file, names)
+            _read(self._path, place, file, names, beginning)
             for place, file in zip(places, self._files, strict=True)
         ]
         for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
@@ -181,10 +199,14 @@ def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> Mc
 
 
 def _read(
-    path: Path, place: Path, file: McapFile | SqliteFile, names: Collection[str]
+    path: Path,
+    place: Path,
+    file: McapFile | SqliteFile,
+    names: Collection[str],
+    beginning: Beginning,
 ) -> Iterator[storage.StoredMessage]:
     with _naming(path, place):
-        yield from file.messages_by_time(names)
+        yield from file.messages_by_time(names, beginning)
 
 
 @contextmanager

@@ -110,7 +110,7 @@ def read_ticks(contents: Contents) -> tuple[Contents, list[TickFacts]]:
     timelines: list[CharacterTimeline] = []
     recordings: dict[str, Recording] = {}
     try:
-        timelines, worlds = collect(bag, messages)
+        timelines, worlds = collect(bag, messages=messages)
         recordings = {each.name: each for each in make_recordings(bag, timelines, worlds)}
     except ActuatedCharactersError as error:
         lacks = lacks or str(error)

@@ -36,7 +36,7 @@ PLANNER_PARAMETERS = [
         "planner",
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
-        "model of the world, or the plan that is in the clip's file (of `reconstruct`)",
+        "model of the world, or the plan that is in the clip's file (of `motion reconstruct`)",
         choices=(NO_PLANNER, PREDICTIVE, RECORDED),
     ),
     Parameter("plan.horizon", 0.8, "how far it looks", unit="s", minimum=0.05, maximum=5.0),

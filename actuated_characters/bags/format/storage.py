@@ -51,6 +51,13 @@ class FileStatistics(NamedTuple):
     last_ns: int
 
 
+class Beginning(NamedTuple):
+    """What may be left out in front: the messages of before, but of some topics."""
+
+    log_time_ns: int = 0
+    whole: frozenset[str] = frozenset()
+
+
 def reason(error: Exception) -> str:
     """The text of a library's error in one line."""
     text = (error.strerror if isinstance(error, OSError) else None) or str(error)
