@@ -17,7 +17,7 @@ Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[str] | list[float]
 
 _Kind = TypeVar("_Kind")
-_MAX_NUMBER = 1e12
+MAX_NUMBER = 1e12
 _LARGEST_FLOAT = sys.float_info.max
 
 
@@ -30,7 +30,7 @@ class Parameter:
     description: str
     unit: str = ""
     minimum: float = 0.0
-    maximum: float = _MAX_NUMBER
+    maximum: float = MAX_NUMBER
     choices: tuple[str, ...] = ()
     texts: bool = False  # an empty list as the default is one of texts, not of numbers
     live: bool = False  # may be changed while the node runs
