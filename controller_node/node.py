@@ -15,7 +15,12 @@ from controller_node.interface.simulator_check import check_simulator
 from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
-from controller_node.parameters import PARAMETERS, character_parameters, check_world
+from controller_node.parameters import (
+    PARAMETERS,
+    ControllerOptions,
+    character_parameters,
+    check_world,
+)
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.live_parameters import LiveParameters
 from msgs_config.bus.node import BusNode, Executor, StopFlag
@@ -231,7 +236,7 @@ class ControllerNode(ComposableNode):
         """Whether all that are to hear the first answer are there; later ones wait for none."""
         if self._last_reply is not None:
             return True
-        wanted = self._values.integer("wait_for_subscribers")
+        wanted = ControllerOptions.of(self._values).wait_for_subscribers
         return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:

@@ -70,8 +70,8 @@ class _FoundPlan(Future[Plan]):
 class PredictivePlanner:
     """Plans for one character. It remembers its last plan, until an episode begins.
 
-    Plans are sought by a thread of their own. For the ticks of `PlannerSettings.planning_delay` the
-    plan before goes on acting; a plan that has not been found by then is waited for.
+    Plans are sought by a thread of their own. For the ticks of `planning_delay` the plan before
+    goes on acting; a plan that has not been found by then is waited for.
     """
 
     def __init__(
@@ -84,9 +84,12 @@ class PredictivePlanner:
         self._made_of = (character, settings, rate_hz, gravity)
         self.settings = settings
         self._model = ContactModel(
-            character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
+            character,
+            period_s=1.0 / rate_hz,
+            gravity=gravity,
+            friction=settings.parameters.friction,
         )
-        self._rollouts = RolloutPool(self._model, settings.workers)
+        self._rollouts = RolloutPool(self._model, settings.parameters.threads)
         self.in_flight = (
             CommandsInFlight(character, self._model, settings.delay) if settings.delay else None
         )
@@ -96,7 +99,7 @@ class PredictivePlanner:
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], object] = int  # called while it waits; `int` does nothing
         self._rate_hz = rate_hz
-        self._seed = settings.seed
+        self._seed = settings.parameters.seed
         self._episode = 0
         self._plan: Plan | None = None
         self._coming: PendingPlan | None = None
@@ -174,7 +177,7 @@ class PredictivePlanner:
             self._coming = self._start_search(tick, tick, state, gains, desired_at)
             self._take(tick)
         assert self._plan is not None
-        acts = tick + self.settings.planning_delay
+        acts = tick + self.settings.parameters.planning_delay
         if self._coming is None and acts >= self._plan.tick + self.settings.period:
             self._coming = self._start_search(tick, acts, state, gains, desired_at)
             self._take(tick)
@@ -226,7 +229,7 @@ class PredictivePlanner:
             return
         if tick < plan.tick:
             self.rest()
-        elif tick - plan.tick >= settings.horizon - settings.planning_delay:
+        elif tick - plan.tick >= settings.horizon - settings.parameters.planning_delay:
             self._abandon_search()
             self._plan = None
         elif self._coming is not None and tick < self._coming.seen:
@@ -279,7 +282,7 @@ class PredictivePlanner:
         position = self._model.position_of(state.position)
         # A message's array cannot be written to, which is another type to compiled code.
         velocity = state.velocity.copy()
-        if not self.settings.gives_way:
+        if not self.settings.parameters.gives_way:
             return position, velocity
         seen = self._anchor.to_reference_world(position, velocity)
         features = self._rollouts.features_of(*seen, body)
