@@ -9,13 +9,13 @@ is its value in m/s.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, ClassVar, Self, TypeVar, get_origin
 
 from msgs_config.parameters import MAX_NUMBER, Parameter, Value, resolve
 
 _T = TypeVar("_T", bool, int, float, str, tuple[str, ...], tuple[float, ...])
-_PARAMETER = "parameter"  # the key of a field's parameter among its metadata
+_PARAMETER, _SHARED = "parameter", "shared"  # keys of a field's metadata
 
 
 def parameter(
@@ -51,17 +51,17 @@ def parameter(
 
 
 def shared(declared: Parameter) -> Any:
-    """A field of `Settings` that is a parameter which others declare, too."""
+    """A field of `Settings` that reads a parameter which others declare."""
     value = declared.default
     default = tuple(value) if isinstance(value, list) else value
-    return field(default=default, metadata={_PARAMETER: declared})
+    return field(default=default, metadata={_PARAMETER: declared, _SHARED: True})
 
 
 @dataclass(frozen=True)
 class Settings:
     """Values of a node's parameters, each a field. A subclass is a frozen dataclass, too.
 
-    Fields that are no parameters need a default.
+    A field may be other settings, whose parameters are among these. All fields have defaults.
     """
 
     _prefix: ClassVar[str] = ""
@@ -73,15 +73,20 @@ class Settings:
     @classmethod
     def declared(cls, **defaults: Value) -> list[Parameter]:
         """The parameters, in the order of the fields; some with other defaults, by the fields."""
-        return [
-            replace(each, default=defaults.get(name, each.default))
-            for name, each in _parameters(cls).items()
-        ]
+        found = []
+        for each in fields(cls):
+            if isinstance(each.default, Settings):
+                found += each.default.declared()
+            elif _PARAMETER in each.metadata and _SHARED not in each.metadata:
+                declared = cls._parameter(each)
+                default = defaults.get(each.name, declared.default)
+                found.append(replace(declared, default=default))
+        return found
 
     @classmethod
     def of(cls, values: Mapping[str, Value], below: str = "") -> Self:
         """The settings among checked values of all parameters, whose names begin with `below`."""
-        return cls(**cls._read(values, below))
+        return cls().changed(values, below)
 
     @classmethod
     def given(cls, given: Mapping[str, object]) -> Self:
@@ -92,25 +97,22 @@ class Settings:
         """
         return cls.of(resolve(cls.declared(), given))
 
-    def changed(self, values: Mapping[str, Value]) -> Self:
-        """The same with the parameters as in checked values of all parameters."""
-        return replace(self, **self._read(values))
+    def changed(self, values: Mapping[str, Value], below: str = "") -> Self:
+        """The same with the parameters of checked values; what is no parameter stays."""
+        read: dict[str, Any] = {}
+        for each in fields(self):
+            before = getattr(self, each.name)
+            if isinstance(before, Settings):
+                read[each.name] = before.changed(values, below)
+            elif _PARAMETER in each.metadata:
+                value = values[below + self._parameter(each).name]
+                read[each.name] = tuple(value) if isinstance(value, list) else value
+        return replace(self, **read)
 
     @classmethod
-    def _read(cls, values: Mapping[str, Value], below: str = "") -> dict[str, Any]:
-        """The values by the fields' names; lists are tuples."""
-        read = {name: values[below + each.name] for name, each in _parameters(cls).items()}
-        return {name: tuple(v) if isinstance(v, list) else v for name, v in read.items()}
-
-
-def _parameters(kind: type[Settings]) -> dict[str, Parameter]:
-    """The parameters by the fields' names."""
-    found = {}
-    for each in fields(kind):
-        if _PARAMETER in each.metadata:
-            declared: Parameter = each.metadata[_PARAMETER]
-            assert type(each.default) is (get_origin(each.type) or each.type), each.name
-            name = declared.name or kind._prefix + each.name
-            texts = each.type == tuple[str, ...]
-            found[each.name] = replace(declared, name=name, texts=texts)
-    return found
+    def _parameter(cls, of: "Field[Any]") -> Parameter:
+        """The parameter of a field."""
+        assert type(of.default) is (get_origin(of.type) or of.type), of.name
+        declared: Parameter = of.metadata[_PARAMETER]
+        name = declared.name or cls._prefix + of.name
+        return replace(declared, name=name, texts=of.type == tuple[str, ...])

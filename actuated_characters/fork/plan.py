@@ -29,6 +29,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.parameters import Value, Values
 from sim_node import parameters as simulator_parameters
+from sim_node.node_settings import NodeSettings
 
 _AS_A_RUN: Mapping[str, Value] = {  # which ends with an error, rather than pause
     **{"on_fault": "abort", "on_timeout": "abort"},
@@ -155,7 +156,7 @@ def _recorded_sensors(path: Path, recording: Recording) -> list[str]:
 def _run_plan(recording: Recording, ticks: int) -> RunPlan:
     """The recorded run, as one to be started."""
     character, simulator = recording.character, simulator_values(recording)
-    timeout = simulator.number("lockstep_timeout") or _LOCKSTEP_TIMEOUT
+    timeout = NodeSettings.of(simulator).lockstep_timeout or _LOCKSTEP_TIMEOUT
     simulator = Values({**simulator, **_AS_A_RUN, "lockstep_timeout": timeout, "max_ticks": ticks})
     given = {**first_parameters(recording), "wait_for_subscribers": 0}
     controller = controller_parameters.resolve_for(character, given)

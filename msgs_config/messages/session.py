@@ -8,17 +8,34 @@ import re
 import secrets
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
-SESSION = Parameter(
-    "session",
-    "",
-    "id of the one simulator that this node is or belongs to, NAME#DIGITS; empty: sim_node makes "
-    "one, and others bind to the first simulator whose states they can use",
-)
+
+@dataclass(frozen=True)
+class GivenSession(Settings):
+    """The session that a node is given. Raises ConfigurationError if it is no session id."""
+
+    id: str = parameter(
+        "",
+        "id of the one simulator that this node is or belongs to, NAME#DIGITS; empty: sim_node "
+        "makes one, and others bind to the first simulator whose states they can use",
+        name="session",
+    )
+
+    def __post_init__(self) -> None:
+        if self.id and not is_session(self.id):
+            raise ConfigurationError(
+                f"parameter 'session' is {self.id!r}; it must be a node's full name, '#' and "
+                "letters or digits, such as /sim_node#3fa29c01b7de, or empty"
+            )
+
+
+(SESSION,) = GivenSession.declared()
 ANONYMOUS = ""
 """The session of all messages that name none."""
 
@@ -46,13 +63,7 @@ def given_session(values: Values) -> str:
     Raises:
         ConfigurationError: it is no session id.
     """
-    text = values.text(SESSION.name)
-    if text and not is_session(text):
-        raise ConfigurationError(
-            f"parameter '{SESSION.name}' is {text!r}; it must be a node's full name, '#' and "
-            "letters or digits, such as /sim_node#3fa29c01b7de, or empty"
-        )
-    return text
+    return GivenSession.of(values).id
 
 
 def is_session(text: str) -> bool:

@@ -14,7 +14,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.parameters import resolve
 from sim_node.physics.body import Body
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,
     FLOATING_CHARACTERS,

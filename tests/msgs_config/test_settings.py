@@ -12,6 +12,14 @@ RATE = Parameter("rate", 240, "ticks a second", unit="Hz", minimum=1)
 
 
 @dataclass(frozen=True)
+class Turn(Settings, prefix="turn."):
+    """Settings that are part of others."""
+
+    limit: float = parameter(1.0, "a turn rate", unit="rad/s")
+    region: str = "none"
+
+
+@dataclass(frozen=True)
 class Gait(Settings, prefix="gait."):
     """One field of each type, and one that is no parameter."""
 
@@ -21,17 +29,21 @@ class Gait(Settings, prefix="gait."):
     weights: tuple[float, ...] = parameter((1.0, 0.5), "weights", at_reset=True)
     kind: str = parameter("walk", "a kind", name="gait_kind", choices=("walk", "run"))
     turns: bool = parameter(True, "whether it turns")
+    turn: Turn = Turn()
     ticks: int = 7
+
+
+OTHERS = [RATE, Parameter("else", 0, "of another component")]
 
 
 def test_each_parameter_has_the_field_s_name_below_the_prefix_and_its_facts() -> None:
     assert Gait.declared() == [
-        RATE,
         Parameter("gait.speed", 1.5, "a speed", "m/s", minimum=-2.0, maximum=2.0, live=True),
         Parameter("gait.clips", [], "clips", texts=True),
         Parameter("gait.weights", [1.0, 0.5], "weights", at_reset=True),
         Parameter("gait_kind", "walk", "a kind", choices=("walk", "run")),
         Parameter("gait.turns", True, "whether it turns"),
+        Parameter("turn.limit", 1.0, "a turn rate", "rad/s"),
     ]
 
 
@@ -43,36 +55,38 @@ def test_defaults_may_be_those_of_a_character() -> None:
 
 
 def test_the_values_of_a_node_are_read_by_their_fields() -> None:
-    others = [Parameter("else", 0, "of another component")]
     given = {"rate": 100, "gait.speed": 1, "gait.clips": ["run"], "gait.weights": [2], "else": 3}
 
-    settings = Gait.of(resolve(others + Gait.declared(), given))
+    settings = Gait.of(resolve(OTHERS + Gait.declared(), given))
 
-    assert settings == Gait(100, 1.0, ("run",), (2.0,), "walk", True, 7)
+    assert settings == Gait(100, 1.0, ("run",), (2.0,), "walk", True, Turn(), 7)
     assert isinstance(settings.speed, float)
 
 
 def test_among_several_characters_names_begin_with_the_character_s() -> None:
-    values = {f"left.{each.name}": each.default for each in Gait.declared()}
+    values = {f"left.{each.name}": each.default for each in [RATE, *Gait.declared()]}
+    values |= {"left.gait.speed": 0.25, "left.turn.limit": 2.0}
 
-    assert Gait.of(values | {"left.gait.speed": 0.25}, below="left.") == Gait(speed=0.25)
+    assert Gait.of(values, below="left.") == Gait(speed=0.25, turn=Turn(2.0))
 
 
 def test_what_is_given_is_checked() -> None:
-    assert Gait.given({"gait_kind": "run"}) == Gait(kind="run")
+    assert Turn.given({"turn.limit": 2}) == Turn(2.0)
 
-    with pytest.raises(ConfigurationError, match=r"'gait\.speed' is 3\.0; it must be -2 to 2 m/s"):
-        Gait.given({"gait.speed": 3})
-    with pytest.raises(ConfigurationError, match=r"gait\.sped"):
-        Gait.given({"gait.sped": 1.0})
+    with pytest.raises(ConfigurationError, match=r"'turn\.limit' is -1\.0; it must be 0 to 1e\+12"):
+        Turn.given({"turn.limit": -1})
+    with pytest.raises(ConfigurationError, match=r"turn\.limt"):
+        Turn.given({"turn.limt": 1.0})
 
 
 def test_a_change_of_parameters_leaves_what_is_none() -> None:
-    settings = Gait(speed=1.0, ticks=9)
+    settings = Gait(speed=1.0, turn=Turn(1.0, "a box"), ticks=9)
 
-    changed = settings.changed(resolve(Gait.declared(), {"gait.speed": 0.5}))
+    changed = settings.changed(
+        resolve([RATE, *Gait.declared()], {"gait.speed": 0.5, "turn.limit": 3.0})
+    )
 
-    assert changed == Gait(speed=0.5, ticks=9)
+    assert changed == Gait(speed=0.5, turn=Turn(3.0, "a box"), ticks=9)
 
 
 def test_settings_stay_as_they_are() -> None:

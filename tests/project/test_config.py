@@ -30,7 +30,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import placed
-from sim_node.initial_state import begins_with_reference
+from sim_node.initial_state import CharacterSettings
 from sim_node.parameters import CharacterParameters, load_parameters
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
@@ -130,7 +130,8 @@ def test_the_file_of_a_motion_holds_no_state(file: str) -> None:
 
     assert not [name for name in parameters if "initial_pos" in name or "initial_vel" in name]
     assert all(
-        begins_with_reference(part.values) for part in load_parameters(parameters).characters
+        CharacterSettings.of(part.values).begins_with_reference
+        for part in load_parameters(parameters).characters
     )
 
 

@@ -11,11 +11,11 @@ from msgs_config.parameters import resolve
 from sim_node.parameters import (
     CHARACTERS,
     PARAMETERS,
+    WORLD_PARAMETERS,
     character_parameters,
     load_parameters,
 )
 from sim_node.simulation_factory import make_simulation_settings
-from sim_node.world_parameters import WORLD_PARAMETERS
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
     box_character,

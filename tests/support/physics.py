@@ -26,9 +26,10 @@ from msgs_config.messages.wrenches import WrenchArrays, select
 from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.body import Body
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharacter
-from sim_node.physics.simulation import Simulation, SimulationSettings
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import (
     make_character_setup,

@@ -37,7 +37,6 @@ from msgs_config.messages import topics, typed
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import resolve
-from sim_node.world_parameters import CONTACT_BREAKING_THRESHOLD as THRESHOLD
 from tests.support.physics import character
 from tests.support.ros import stamp_ns
 
@@ -380,14 +379,18 @@ def test_the_processors_kernels_do_not_matter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("planner", "given", "threshold"),
-    [("none", {}, 0.02), ("predictive", {}, 0.1), ("predictive", {THRESHOLD: 0.02}, 0.02)],
+    [
+        ("none", {}, 0.02),
+        ("predictive", {}, 0.1),
+        ("predictive", {"contact_breaking_threshold": 0.02}, 0.02),
+    ],
 )
 def test_runs_that_are_planned_have_contacts_that_keep_their_points(
     planner: str, given: dict[str, object], threshold: float
 ) -> None:
     plan = make_plan("humanoid", 0.1, {"clip": "walk"}, given, {"planner": planner})
 
-    assert plan.simulator[THRESHOLD] == threshold
+    assert plan.simulator["contact_breaking_threshold"] == threshold
 
 
 @pytest.mark.slow
