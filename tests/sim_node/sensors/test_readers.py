@@ -10,7 +10,6 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import rotations
-from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.node_settings import SensingSettings
 from sim_node.sensors.link_motion import LinkKinematics
@@ -69,8 +68,7 @@ def force(values: FloatArray) -> FloatArray:
 
 def of_character(whole: Character, **given: object) -> LoneSimulation:
     """A simulation of a character that is no shipped one."""
-    parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
-    values = resolve(parameters, given)
+    values = for_simulator.resolve_alone(whole, given)
     return LoneSimulation(make_character_setup(whole, values), make_simulation_settings(values))
 
 
