@@ -24,7 +24,6 @@ _FULL_FOOTING, _NO_FOOTING = 0.75, 0.5  # cosines of a sole's tilt: 41 and 60 de
 _LEAST_TIPPING = 1e-9  # N m^2, the least divisor, where the feet are in one place
 
 
-@dataclass(frozen=True)
 class BalanceGains(Settings, prefix="balance."):
     """How the centre of mass is held. The defaults suit the humanoid, 45 kg."""
 

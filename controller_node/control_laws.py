@@ -233,7 +233,6 @@ def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> Fl
 LAWS = tuple(sorted((*_LAWS.names, "pid")))
 
 
-@dataclass(frozen=True)
 class LawSettings(Settings):
     """Which law it is, and of what."""
 

@@ -29,7 +29,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.session import ANONYMOUS, given_session
+from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
@@ -78,7 +78,7 @@ class ControllerNode(ComposableNode):
         self._decoder = StateDecoder(self._layout, controller.clock)
         self._simulators = Simulators(
             self.node,
-            given_session(self._values),
+            ControllerOptions.of(self._values).session.id,
             controller.clock,
             lambda found: check_simulator(self._controller, self._character, self._values, found),
             logger,

@@ -1,7 +1,7 @@
 """The parameters of `controller_node`, and the controller that they make."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -25,7 +25,7 @@ from controller_node.references.base import Reference
 from controller_node.references.factory import MOTION_PARAMETERS
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
-from msgs_config.messages.session import SESSION
+from msgs_config.messages.session import GivenSession
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import SharedSettings
@@ -33,7 +33,13 @@ from msgs_config.shared_parameters import SharedSettings
 _ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
 
-@dataclass(frozen=True)
+class GainScale(Settings, prefix="gain_scale."):
+    """Factors on the gains of all joints."""
+
+    p: float = parameter(1.0, "factor on every joint's stiffness, not the root's", live=True)
+    d: float = parameter(1.0, "factor on every joint's damping, not the root's", live=True)
+
+
 class ControllerOptions(Settings):
     """What the controller does around its law."""
 
@@ -55,25 +61,17 @@ class ControllerOptions(Settings):
         name="balance.enabled",
         live=True,
     )
-
-
-@dataclass(frozen=True)
-class GainScale(Settings, prefix="gain_scale."):
-    """Factors on the gains of all joints."""
-
-    p: float = parameter(1.0, "factor on every joint's stiffness, not the root's", live=True)
-    d: float = parameter(1.0, "factor on every joint's damping, not the root's", live=True)
+    balance_gains: BalanceGains = BalanceGains()
+    session: GivenSession = GivenSession()
+    gain_scale: GainScale = GainScale()
 
 
 PARAMETERS = [
     *SharedSettings.declared(),
     *LawSettings.declared(),
     *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
-    *planner_settings.PLANNER_PARAMETERS,
+    *PlannerParameters.declared(),
     *ControllerOptions.declared(),
-    *BalanceGains.declared(),
-    SESSION,
-    *GainScale.declared(),
 ]
 
 _GAINS = {  # the end of a parameter's name: the field of `Gains`, its description, its unit
@@ -138,7 +136,7 @@ def character_parameters(
 def make_gains(character: Character, values: Values) -> GainArrays:
     """The gains of the law, scaled, and the effort limits that the parameters' values say."""
     names, followers = character.vector_names, character.layout.followers
-    scale = GainScale.of(values)
+    scale = ControllerOptions.of(values).gain_scale
     scales = {"p": scale.p, "d": scale.d, "i": 1.0}
     root = float(_assists(values))
     gains = {}
@@ -167,7 +165,7 @@ def make_controller_settings(character: Character, values: Values) -> Controller
         law="zero" if is_ragdoll else LawSettings.of(values).law,
         gains=make_gains(character, values),
         follows_velocity=options.reference_velocity == "clip",
-        balance=BalanceGains.of(values) if options.balance and not is_ragdoll else None,
+        balance=options.balance_gains if options.balance and not is_ragdoll else None,
         strengths=np.array(strengths),
     )
 

@@ -1,6 +1,5 @@
 """Settings: frozen dataclasses whose fields are parameters of a node, each declared once.
 
-    @dataclass(frozen=True)
     class SteeringLimits(Settings, prefix="steering."):
         speed: float = parameter(2.5, "its largest speed ahead", unit="m/s", maximum=10.0)
 
@@ -10,7 +9,7 @@ is its value in m/s.
 
 from collections.abc import Collection, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
-from typing import Any, ClassVar, Self, TypeVar, get_origin
+from typing import Any, ClassVar, Self, TypeVar, dataclass_transform, get_origin
 
 from msgs_config.parameters import MAX_NUMBER, Parameter, Value, resolve
 
@@ -36,17 +35,8 @@ def parameter(
     as in `Parameter`.
     """
     plain: Any = list(default) if isinstance(default, tuple) else default
-    declared = Parameter(
-        name,
-        plain,
-        description,
-        unit=unit,
-        minimum=minimum,
-        maximum=maximum,
-        choices=tuple(choices),
-        live=live,
-        at_reset=at_reset,
-    )
+    facts = (unit, minimum, maximum, tuple(choices))
+    declared = Parameter(name, plain, description, *facts, live=live, at_reset=at_reset)
     return field(default=default, metadata={_PARAMETER: declared})
 
 
@@ -57,9 +47,10 @@ def shared(declared: Parameter) -> Any:
     return field(default=default, metadata={_PARAMETER: declared, _SHARED: True})
 
 
+@dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Settings:
-    """Values of a node's parameters, each a field. A subclass is a frozen dataclass, too.
+    """Values of a node's parameters, each a field. A subclass is a frozen dataclass by itself.
 
     A field may be other settings, whose parameters are among these. All fields have defaults.
     """
@@ -69,6 +60,7 @@ class Settings:
     def __init_subclass__(cls, prefix: str = "") -> None:
         """`prefix` stands before the names of the fields in those of the parameters."""
         cls._prefix = prefix
+        dataclass(frozen=True)(cls)
 
     @classmethod
     def declared(cls, **defaults: Value) -> list[Parameter]:

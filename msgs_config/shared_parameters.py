@@ -1,7 +1,6 @@
 """The parameters that simulator and controller have in common, and must agree on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from msgs_config.character.model import Character, Placement
 from msgs_config.errors import ConfigurationError
@@ -12,7 +11,6 @@ PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any oth
 FROM_FILE, NO_COLLISIONS = "file", "none"
 
 
-@dataclass(frozen=True)
 class SharedSettings(Settings):
     """What both sides are set to."""
 

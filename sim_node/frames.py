@@ -1,14 +1,11 @@
 """The coordinate frames that ROS' tools know a character by (REP 105)."""
 
-from dataclasses import dataclass
-
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.frame_names import BASE_FRAME, WORLD
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class FrameNames(Settings):
     """Names of the frames above a character's links, without the character's prefix.
 

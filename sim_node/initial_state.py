@@ -1,7 +1,6 @@
 """Where a character begins: as parameters say, or as its controller's reference does. No ROS."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +20,6 @@ INITIAL_STATE, POSITION, VELOCITY = "initial_state", "initial_position", "initia
 _LIMIT_ROUNDING = 1e-9  # rad or m by which a position may be beyond its limits
 
 
-@dataclass(frozen=True)
 class CharacterSettings(Settings):
     """What of a character is commanded, and where it begins. The defaults are the character's."""
 

@@ -1,7 +1,5 @@
 """What `sim_node` itself is set to, beside the simulation."""
 
-from dataclasses import dataclass
-
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import GivenSession
 from msgs_config.settings import Settings, parameter, shared
@@ -11,7 +9,6 @@ from sim_node.frames import FrameNames
 _LARGEST_COUNT = 2**62
 
 
-@dataclass(frozen=True)
 class SensingSettings(Settings):
     """What readings depend on beside states, contacts and the sensor itself."""
 
@@ -30,7 +27,6 @@ class SensingSettings(Settings):
         return 1.0 / self.rate_hz
 
 
-@dataclass(frozen=True)
 class NodeSettings(Settings):
     """All that the node depends on beside the simulation and its settings.
 

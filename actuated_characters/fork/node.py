@@ -5,7 +5,7 @@ them. Up to the fork it compares each state with the recorded one.
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,6 @@ from msgs_config.settings import Settings, parameter
 from msgs_config.versions import describe_changes, installed_versions
 
 
-@dataclass(frozen=True)
 class ForkSettings(Settings):
     """Which run is forked where, and what is new from there on."""
 

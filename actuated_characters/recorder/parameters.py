@@ -1,7 +1,5 @@
 """What the recorder is set to."""
 
-from dataclasses import dataclass
-
 from actuated_characters.bags.format.storage import (
     COMPRESSIONS,
     LOG_TIMES,
@@ -12,7 +10,6 @@ from msgs_config.messages.session import GivenSession
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class RecorderSettings(Settings):
     """What is recorded, of whom, and where to."""
 

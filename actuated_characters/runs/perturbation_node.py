@@ -1,7 +1,7 @@
 """`pusher`: sends pushes, throws and velocities that were planned before a run."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from actuated_characters.runs.planned.throws import read_throws
@@ -17,7 +17,6 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class PerturbationSettings(Settings):
     """What is sent, and to how many."""
 

@@ -1,12 +1,9 @@
 """What the viewer is set to."""
 
-from dataclasses import dataclass
-
 from actuated_characters.viewer.web.request_check import LOOPBACK
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class ViewerSettings(Settings):
     """Where the page is, and how often it is drawn."""
 

@@ -1,7 +1,5 @@
 """The behaviour that the parameters' values say."""
 
-from dataclasses import dataclass
-
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine import factory as state_machine
@@ -14,7 +12,6 @@ from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class BehaviourSettings(Settings):
     """What a character does beside tracking."""
 

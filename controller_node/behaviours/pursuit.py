@@ -10,7 +10,6 @@ Source: Reynolds 1999, "Steering Behaviors for Autonomous Characters": seek, and
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,7 +34,6 @@ _NEAREST = 1e-3  # m; nearer than that no way leads to the opponent
 _ONTO = 0.3  # s, until a strike's motion is reached
 
 
-@dataclass(frozen=True)
 class PursuitSettings(Settings):
     """How an opponent is gone for."""
 

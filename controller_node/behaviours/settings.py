@@ -1,6 +1,6 @@
 """The settings of the behaviours that react to hits, checked."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import available_clips
@@ -12,7 +12,6 @@ from msgs_config.shared_parameters import NO_GROUND, PLANE
 _TELLS_HITS = ("active_ragdoll", "pursuit", "reactive")
 
 
-@dataclass(frozen=True)
 class ReactionSettings(Settings):
     """The settings of `active_ragdoll`, `pursuit` and `reactive`."""
 

@@ -8,6 +8,7 @@ from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import (
     NO_PLANNER,
+    PREDICTIVE,
     RECORDED,
     PlannerParameters,
     check_planner,
@@ -21,7 +22,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.extras import hint, require_extra
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import COMMAND_DELAY, SharedSettings
+from msgs_config.shared_parameters import COMMAND_DELAY
 
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
@@ -41,10 +42,9 @@ def check_planning(character: Character, values: Values) -> None:
 
 def check_installed(values: Values) -> None:
     """Raise ConfigurationError, with how to get it, where the planner's extra is not installed."""
-    name = PlannerParameters.of(values).planner
-    delayed = SharedSettings.of(values).command_delay_ticks > 0
-    if name != NO_PLANNER and (name != RECORDED or delayed):
-        require_extra("plan", f"planner '{name}'")
+    given = PlannerParameters.of(values)
+    if given.planner == PREDICTIVE or (given.planner == RECORDED and given.delay > 0):
+        require_extra("plan", f"planner '{given.planner}'")
 
 
 def make_planner(character: Character, values: Values) -> Planner | None:
@@ -64,13 +64,12 @@ def make_planner(character: Character, values: Values) -> Planner | None:
     settings = make_planner_settings(character, values)
     with saying_what_it_needs(name):
         from controller_node.planner.planner import PredictivePlanner
-    shared = SharedSettings.of(values)
-    return PredictivePlanner(character, settings, rate_hz=shared.rate, gravity=shared.gravity)
+    return PredictivePlanner(character, settings)
 
 
 def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
     """The plan in a clip's file, at this controller's rate."""
-    clip, rate = ClipSettings.of(values).clip, SharedSettings.of(values).rate
+    clip, rate = ClipSettings.of(values).clip, PlannerParameters.of(values).rate_hz
     is_clip = MotionSettings.of(values).reference == "clip"
     plan = ReconstructedClip(character, clip).plan if is_clip else None
     if plan is None:
@@ -87,19 +86,19 @@ def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
 
 def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlight | None":
     """The commands on their way, where they take a tick or more."""
-    shared = SharedSettings.of(values)
-    if not shared.command_delay_ticks:
+    given = PlannerParameters.of(values)
+    if not given.delay:
         return None
     with saying_what_it_needs(f"{RECORDED}' with '{COMMAND_DELAY.name}"):
         from controller_node.planner.commands_in_flight import CommandsInFlight
         from controller_node.planner.contact_model import ContactModel
     model = ContactModel(
         character,
-        period_s=shared.period,
-        gravity=shared.gravity,
-        friction=PlannerParameters.of(values).friction,
+        period_s=1.0 / given.rate_hz,
+        gravity=given.gravity,
+        friction=given.friction,
     )
-    return CommandsInFlight(character, model, shared.command_delay_ticks)
+    return CommandsInFlight(character, model, given.delay)
 
 
 @contextmanager

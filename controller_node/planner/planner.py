@@ -74,32 +74,30 @@ class PredictivePlanner:
     goes on acting; a plan that has not been found by then is waited for.
     """
 
-    def __init__(
-        self, character: Character, settings: PlannerSettings, *, rate_hz: int, gravity: float
-    ) -> None:
+    def __init__(self, character: Character, settings: PlannerSettings) -> None:
         """Build the model of the world, once for each thread.
 
         The first time on a machine the rollouts are compiled, which takes half a minute.
         """
-        self._made_of = (character, settings, rate_hz, gravity)
-        self.settings = settings
+        self._made_of = (character, settings)
+        self.settings, given = settings, settings.parameters
         self._model = ContactModel(
             character,
-            period_s=1.0 / rate_hz,
-            gravity=gravity,
-            friction=settings.parameters.friction,
+            period_s=1.0 / given.rate_hz,
+            gravity=given.gravity,
+            friction=given.friction,
         )
-        self._rollouts = RolloutPool(self._model, settings.parameters.threads)
+        self._rollouts = RolloutPool(self._model, given.threads)
         self.in_flight = (
-            CommandsInFlight(character, self._model, settings.delay) if settings.delay else None
+            CommandsInFlight(character, self._model, given.delay) if given.delay else None
         )
         self._residual_model = ResidualModel(character, self._model, settings)
-        self._search = PlanSearch(self._rollouts, self._residual_model, settings, rate_hz)
+        self._search = PlanSearch(self._rollouts, self._residual_model, settings)
         self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], object] = int  # called while it waits; `int` does nothing
-        self._rate_hz = rate_hz
-        self._seed = settings.parameters.seed
+        self._rate_hz = given.rate_hz
+        self._seed = given.seed
         self._episode = 0
         self._plan: Plan | None = None
         self._coming: PendingPlan | None = None
@@ -301,10 +299,9 @@ class PredictivePlanner:
         return planar_state(position, velocity, *self._residual_model.balance(features))
 
 
-def _copy_of(made_of: tuple[Character, PlannerSettings, int, float], state: Any) -> object:
+def _copy_of(made_of: tuple[Character, PlannerSettings], state: Any) -> object:
     """The copy of a planner that was made of these, in its state."""
-    character, settings, rate_hz, gravity = made_of
-    copy = PredictivePlanner(character, settings, rate_hz=rate_hz, gravity=gravity)
+    copy = PredictivePlanner(*made_of)
     copy._seed, copy._episode, copy._plan, copy._coming, copy._anchor, sent = state
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)

@@ -11,8 +11,8 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
-from msgs_config.settings import Settings, parameter
-from msgs_config.shared_parameters import COMMAND_DELAY, PLANE, SharedSettings
+from msgs_config.settings import Settings, parameter, shared
+from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
 
 NO_PLANNER = "none"
 PREDICTIVE = "predictive"
@@ -21,10 +21,36 @@ RECORDED = "recorded"
 PLANNING_DELAY = "planning_delay_ticks"
 
 
-@dataclass(frozen=True)
+class CostWeights(Settings, prefix="plan.weight."):
+    """The weights of a rollout's deviations from the reference."""
+
+    root_rotation: float = parameter(5.0, "of the error of the root's rotation", unit="1/rad")
+    joints: float = parameter(1.0, "of the error of the joints' rotations", unit="1/rad")
+    root_spin: float = parameter(0.3, "of the error of the root's angular velocity", unit="s/rad")
+    joint_rates: float = parameter(0.02, "of the error of the joints' velocities", unit="s/rad")
+    centre_of_mass: float = parameter(40.0, "of the error of the centre of mass", unit="1/m")
+    centre_of_mass_velocity: float = parameter(
+        10.0, "of the error of the velocity of the centre of mass", unit="s/m"
+    )
+    angular_momentum: float = parameter(
+        0.4,
+        "of the error of the angular momentum about the centre of mass",
+        unit="1/(N m s)",
+    )
+    feet: float = parameter(
+        10.0, "of the error of the links that the character stands on", unit="1/m"
+    )
+    hands: float = parameter(
+        2.0, "of the error of the other links that carry no others", unit="1/m"
+    )
+
+
 class PlannerParameters(Settings, prefix="plan."):
     """What a planner is set to."""
 
+    rate_hz: int = shared(RATE)
+    gravity: float = shared(GRAVITY)
+    delay: int = shared(COMMAND_DELAY)  # ticks
     planner: str = parameter(
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
@@ -64,39 +90,13 @@ class PlannerParameters(Settings, prefix="plan."):
         unit="ticks",
     )
     workers: int = parameter(0, "threads; 0: one for each processor", maximum=256)
+    weights: CostWeights = CostWeights()
 
     @property
     def threads(self) -> int:
         """How many threads roll out plans."""
         return self.workers or len(os.sched_getaffinity(0))
 
-
-@dataclass(frozen=True)
-class CostWeights(Settings, prefix="plan.weight."):
-    """The weights of a rollout's deviations from the reference."""
-
-    root_rotation: float = parameter(5.0, "of the error of the root's rotation", unit="1/rad")
-    joints: float = parameter(1.0, "of the error of the joints' rotations", unit="1/rad")
-    root_spin: float = parameter(0.3, "of the error of the root's angular velocity", unit="s/rad")
-    joint_rates: float = parameter(0.02, "of the error of the joints' velocities", unit="s/rad")
-    centre_of_mass: float = parameter(40.0, "of the error of the centre of mass", unit="1/m")
-    centre_of_mass_velocity: float = parameter(
-        10.0, "of the error of the velocity of the centre of mass", unit="s/m"
-    )
-    angular_momentum: float = parameter(
-        0.4,
-        "of the error of the angular momentum about the centre of mass",
-        unit="1/(N m s)",
-    )
-    feet: float = parameter(
-        10.0, "of the error of the links that the character stands on", unit="1/m"
-    )
-    hands: float = parameter(
-        2.0, "of the error of the other links that carry no others", unit="1/m"
-    )
-
-
-PLANNER_PARAMETERS = [*PlannerParameters.declared(), *CostWeights.declared()]
 
 _SIGMA_TURN = 0.4  # rad, of joints that the character's file says nothing of
 _SIGMA_SLIDE = 0.05  # m, of sliders that the character's file says nothing of
@@ -107,11 +107,9 @@ class PlannerSettings:
     """What plans depend on, times in ticks."""
 
     parameters: PlannerParameters
-    weights: CostWeights
     horizon: int  # a whole number of periods
     period: int
     knots: int
-    delay: int  # from a state to when the command that answers it acts
     sigma: FloatArray  # (n - 6,) rad or m
 
     @property
@@ -130,9 +128,9 @@ def check_planner(character: Character, planner: str) -> None:
 
 def make_planner_settings(character: Character, values: Values) -> PlannerSettings:
     """The settings of planning ahead. Raises ConfigurationError if times contradict each other."""
-    given, shared = PlannerParameters.of(values), SharedSettings.of(values)
+    given = PlannerParameters.of(values)
     horizon, period, knots = (
-        max(round(time * shared.rate), 1) for time in (given.horizon, given.period, given.knots)
+        max(round(time * given.rate_hz), 1) for time in (given.horizon, given.period, given.knots)
     )
     if horizon < period:
         raise ConfigurationError(
@@ -145,40 +143,36 @@ def make_planner_settings(character: Character, values: Values) -> PlannerSettin
             f"parameter '{PLANNING_DELAY}' is {given.planning_delay}; it must be at most {most}: "
             f"no more than plan.period, {period} ticks, and than what plan.horizon leaves beside it"
         )
-    delay = shared.command_delay_ticks
-    if delay >= horizon:
+    if given.delay >= horizon:
         raise ConfigurationError(
-            f"parameter '{COMMAND_DELAY.name}' is {delay}; with planner 'predictive' it must be "
-            f"less than plan.horizon, {horizon} ticks"
+            f"parameter '{COMMAND_DELAY.name}' is {given.delay}; with planner 'predictive' it must "
+            f"be less than plan.horizon, {horizon} ticks"
         )
     return PlannerSettings(
         parameters=given,
-        weights=CostWeights.of(values),
         horizon=horizon - horizon % period,
         period=period,
         knots=knots,
-        delay=delay,
         sigma=_sigma(character),
     )
 
 
 def check_world(values: Values, simulator: Mapping[str, object]) -> None:
     """Raise ConfigurationError if the model of the world is not of a simulator's parameters."""
-    planner = PlannerParameters.of(values).planner
-    if planner == NO_PLANNER:
+    own = PlannerParameters.of(values)
+    if own.planner == NO_PLANNER:
         return
     terrain = simulator.get("terrain", PLANE)
     if terrain != PLANE:
         raise ConfigurationError(
-            f"planner '{planner}' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
+            f"planner '{own.planner}' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
             f"{terrain}; it must be {PLANE}"
         )
-    own = SharedSettings.of(values).command_delay_ticks
-    delay = simulator.get(COMMAND_DELAY.name, own)
-    if delay != own:
+    delay = simulator.get(COMMAND_DELAY.name, own.delay)
+    if delay != own.delay:
         raise ConfigurationError(
-            f"planner '{planner}' counts with '{COMMAND_DELAY.name}' {own}, but sim_node's is "
-            f"{delay}; it must be the same"
+            f"planner '{own.planner}' counts with '{COMMAND_DELAY.name}' {own.delay}, but "
+            f"sim_node's is {delay}; it must be the same"
         )
 
 

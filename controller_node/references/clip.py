@@ -3,7 +3,6 @@
 import cmath
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -171,7 +170,6 @@ def _cycle_turn(root_xyzw: FloatArray) -> FloatArray:
     return rotations.yaw(rotations.multiply(root_xyzw[-1], rotations.conjugate(root_xyzw[0])))
 
 
-@dataclass(frozen=True)
 class ClipSettings(Settings):
     """The clip that is tracked."""
 

@@ -1,7 +1,5 @@
 """Which motion to track: the parameters that say it, and the reference that they make."""
 
-from dataclasses import dataclass
-
 from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  register their own
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.steering import factory as steering  # noqa: F401  registers its own
@@ -10,7 +8,6 @@ from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class MotionSettings(Settings):
     """Which motion is tracked."""
 

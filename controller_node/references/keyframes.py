@@ -1,6 +1,5 @@
 """Keyframes as a reference: poses at times, and the path between them."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +116,6 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-@dataclass(frozen=True)
 class KeyframesSettings(Settings):
     """The keyframes that are tracked."""
 

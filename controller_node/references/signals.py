@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -83,7 +82,6 @@ class SineReference:
         )
 
 
-@dataclass(frozen=True)
 class SignalSettings(Settings, prefix="signal."):
     """What any test signal moves."""
 
@@ -92,7 +90,6 @@ class SignalSettings(Settings, prefix="signal."):
     )
 
 
-@dataclass(frozen=True)
 class StepSettings(Settings, prefix="step."):
     """The step of `StepReference`."""
 
@@ -100,7 +97,6 @@ class StepSettings(Settings, prefix="step."):
     time: float = parameter(0.5, "when, since the episode began", unit="s")
 
 
-@dataclass(frozen=True)
 class SineSettings(Settings, prefix="sine."):
     """The sine of `SineReference`."""
 

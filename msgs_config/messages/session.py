@@ -8,15 +8,12 @@ import re
 import secrets
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class GivenSession(Settings):
     """The session that a node is given. Raises ConfigurationError if it is no session id."""
 
@@ -55,15 +52,6 @@ _MOST_NAMED = 8  # foreign sessions
 def make_session(node_name: str) -> str:
     """A new id for a simulator whose node has this full name. It influences no state."""
     return f"{node_name}{_MARK}{secrets.token_hex(6)}"
-
-
-def given_session(values: Values) -> str:
-    """The value of the parameter `session`, empty if none was given.
-
-    Raises:
-        ConfigurationError: it is no session id.
-    """
-    return GivenSession.of(values).id
 
 
 def is_session(text: str) -> bool:

@@ -1,7 +1,5 @@
 """What a simulation and its world are set to."""
 
-from dataclasses import dataclass
-
 from msgs_config.character.model import UrdfOptions
 from msgs_config.settings import Settings, parameter, shared
 from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
@@ -10,7 +8,6 @@ STEADY_CONTACTS = {"contact_breaking_threshold": 0.1}
 """Parameters of a world in which a loaded foot stands on all of its sole."""
 
 
-@dataclass(frozen=True)
 class WorldSettings(Settings):
     """The physics of the world. Its parameters may change at a reset."""
 
@@ -38,7 +35,6 @@ class WorldSettings(Settings):
     terrain: UrdfOptions | None = None  # a fixed body beside the plane
 
 
-@dataclass(frozen=True)
 class SimulationSettings(Settings):
     """All that a simulation depends on beside its setups, the efforts, pushes and throws."""
 

@@ -1,6 +1,6 @@
 """Settings: what a dataclass declares, and what it reads of the values of all parameters."""
 
-from dataclasses import FrozenInstanceError, dataclass
+from dataclasses import FrozenInstanceError
 
 import pytest
 
@@ -11,7 +11,6 @@ from msgs_config.settings import Settings, parameter, shared
 RATE = Parameter("rate", 240, "ticks a second", unit="Hz", minimum=1)
 
 
-@dataclass(frozen=True)
 class Turn(Settings, prefix="turn."):
     """Settings that are part of others."""
 
@@ -19,7 +18,6 @@ class Turn(Settings, prefix="turn."):
     region: str = "none"
 
 
-@dataclass(frozen=True)
 class Gait(Settings, prefix="gait."):
     """One field of each type, and one that is no parameter."""
 
@@ -95,7 +93,6 @@ def test_settings_stay_as_they_are() -> None:
 
 
 def test_a_default_of_another_type_than_the_field_s_is_a_mistake_of_the_program() -> None:
-    @dataclass(frozen=True)
     class Wrong(Settings):
         speed: float = parameter(1, "a whole number as the default of a speed")
 

@@ -1,6 +1,6 @@
 """The node `player` in the controller's place: it sends the commands that a bag has."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,7 +26,6 @@ from msgs_config.messages.wrenches import encode_wrenches
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class RecordedControllerSettings(Settings):
     """Which recording is played, and where what comes back goes."""
 

@@ -2,7 +2,6 @@
 
 import math
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,6 @@ from msgs_config.messages.topic import Topic
 from msgs_config.settings import Settings, parameter
 
 
-@dataclass(frozen=True)
 class RecordedSimulatorSettings(Settings):
     """Which recording is played, and where what answers it goes."""
 

@@ -1,6 +1,6 @@
 """The behaviour `state_machine`, as the parameters' values say."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
@@ -27,7 +27,6 @@ from msgs_config.shared_parameters import COMMAND_DELAY, SharedSettings
 STATE_MACHINE = "state_machine"
 
 
-@dataclass(frozen=True)
 class MachineSettings(Settings):
     """The machine whose states it goes through."""
 

@@ -25,7 +25,7 @@ class ResidualModel:
     def __init__(
         self, character: Character, model: ContactModel, settings: PlannerSettings
     ) -> None:
-        joints, weights = len(settings.sigma), settings.weights
+        joints, weights = len(settings.sigma), settings.parameters.weights
         is_foot = [character.links[index].name in character.feet for index in model.end_effectors]
         parts = [
             (weights.root_rotation, 3),

@@ -48,10 +48,9 @@ class PlanSearch:
         rollouts: RolloutPool,
         residual_model: ResidualModel,
         settings: PlannerSettings,
-        rate_hz: int,
     ) -> None:
         self._rollouts, self._residual_model = rollouts, residual_model
-        self._settings, self._rate_hz = settings, rate_hz
+        self._settings = settings
         self._unit = settings.parameters.noise * settings.sigma  # (n - 6,) rad or m: the unit of x
 
     def find(self, start: Start, old: Plan | None, seed: tuple[int, int]) -> Plan:
@@ -154,6 +153,7 @@ class PlanSearch:
         best = found.deviations[0].reshape(checks, -1)
         centres, _ = self._residual_model.balance(start.desired.features + best)
         numbers: FloatArray = np.arange(1.0, checks + 1.0)
-        times = (settings.delay + settings.period * numbers) / self._rate_hz
+        given = settings.parameters
+        times = (given.delay + settings.period * numbers) / given.rate_hz
         costs, others = fixed_order.dot(residuals, residuals)
         return Outlook(times, start.anchor.to_world(centres), costs, others, start.anchor)

@@ -1,7 +1,5 @@
 """The clips of the reference `steered`, and what they make."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion
@@ -18,7 +16,6 @@ from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import SharedSettings
 
 
-@dataclass(frozen=True)
 class GaitSettings(Settings, prefix="steering."):
     """The clips that a steered character moves by."""
 

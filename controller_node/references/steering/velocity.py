@@ -32,7 +32,6 @@ class VelocityRegion:
     turn: float = math.inf  # rad/s, to either side
 
 
-@dataclass(frozen=True)
 class SteeringLimits(Settings, prefix="steering."):
     """How fast it may go, how fast that changes, and how long a command holds."""
 
