@@ -41,10 +41,8 @@ def parameter(
 
 
 def shared(declared: Parameter) -> Any:
-    """A field of `Settings` that reads a parameter which others declare."""
-    value = declared.default
-    default = tuple(value) if isinstance(value, list) else value
-    return field(default=default, metadata={_PARAMETER: declared, _SHARED: True})
+    """A field of `Settings` that reads a parameter, no list, which others declare."""
+    return field(default=declared.default, metadata={_PARAMETER: declared, _SHARED: True})
 
 
 @dataclass_transform(frozen_default=True)
@@ -55,12 +53,13 @@ class Settings:
     A field may be other settings, whose parameters are among these. All fields have defaults.
     """
 
-    _prefix: ClassVar[str] = ""
+    _parameters: ClassVar[dict[str, Parameter]] = {}  # by the fields' names
 
     def __init_subclass__(cls, prefix: str = "") -> None:
         """`prefix` stands before the names of the fields in those of the parameters."""
-        cls._prefix = prefix
         dataclass(frozen=True)(cls)
+        declared = [each for each in fields(cls) if _PARAMETER in each.metadata]
+        cls._parameters = {each.name: _parameter_of(each, prefix) for each in declared}
 
     @classmethod
     def declared(cls, **defaults: Value) -> list[Parameter]:
@@ -69,10 +68,10 @@ class Settings:
         for each in fields(cls):
             if isinstance(each.default, Settings):
                 found += each.default.declared()
-            elif _PARAMETER in each.metadata and _SHARED not in each.metadata:
-                declared = cls._parameter(each)
-                default = defaults.get(each.name, declared.default)
-                found.append(replace(declared, default=default))
+            elif each.name in cls._parameters and _SHARED not in each.metadata:
+                parameter = cls._parameters[each.name]
+                default = defaults.get(each.name, parameter.default)
+                found.append(replace(parameter, default=default))
         return found
 
     @classmethod
@@ -91,20 +90,20 @@ class Settings:
 
     def changed(self, values: Mapping[str, Value], below: str = "") -> Self:
         """The same with the parameters of checked values; what is no parameter stays."""
-        read: dict[str, Any] = {}
-        for each in fields(self):
-            before = getattr(self, each.name)
+        now: dict[str, Any] = {}
+        for name, before in vars(self).items():
             if isinstance(before, Settings):
-                read[each.name] = before.changed(values, below)
-            elif _PARAMETER in each.metadata:
-                value = values[below + self._parameter(each).name]
-                read[each.name] = tuple(value) if isinstance(value, list) else value
-        return replace(self, **read)
+                now[name] = before.changed(values, below)
+            elif name in self._parameters:
+                value = values[below + self._parameters[name].name]
+                now[name] = tuple(value) if isinstance(value, list) else value
+        return replace(self, **now)
 
-    @classmethod
-    def _parameter(cls, of: "Field[Any]") -> Parameter:
-        """The parameter of a field."""
-        assert type(of.default) is (get_origin(of.type) or of.type), of.name
-        declared: Parameter = of.metadata[_PARAMETER]
-        name = declared.name or cls._prefix + of.name
-        return replace(declared, name=name, texts=of.type == tuple[str, ...])
+
+def _parameter_of(declared: "Field[Any]", prefix: str) -> Parameter:
+    """The parameter of a field, whose default must have the field's type."""
+    kind, parameter = declared.type, declared.metadata[_PARAMETER]
+    assert type(declared.default) is (get_origin(kind) or kind), declared.name
+    name = parameter.name or prefix + declared.name
+    complete: Parameter = replace(parameter, name=name, texts=kind == tuple[str, ...])
+    return complete

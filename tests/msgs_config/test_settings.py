@@ -93,8 +93,7 @@ def test_settings_stay_as_they_are() -> None:
 
 
 def test_a_default_of_another_type_than_the_field_s_is_a_mistake_of_the_program() -> None:
-    class Wrong(Settings):
-        speed: float = parameter(1, "a whole number as the default of a speed")
-
     with pytest.raises(AssertionError, match="speed"):
-        Wrong.declared()
+
+        class Wrong(Settings):
+            speed: float = parameter(1, "a whole number as the default of a speed")
