@@ -28,7 +28,7 @@ from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.messages.session import GivenSession
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.settings import Settings, parameter
-from msgs_config.shared_parameters import SharedSettings
+from msgs_config.shared_parameters import CharacterSource, SharedSettings
 
 _ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
@@ -67,6 +67,7 @@ class ControllerOptions(Settings):
 
 
 PARAMETERS = [
+    *CharacterSource.declared(),
     *SharedSettings.declared(),
     *LawSettings.declared(),
     *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),

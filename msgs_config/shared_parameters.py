@@ -11,8 +11,8 @@ PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any oth
 FROM_FILE, NO_COLLISIONS = "file", "none"
 
 
-class SharedSettings(Settings):
-    """What both sides are set to."""
+class CharacterSource(Settings):
+    """Which character it is, and where it stands; all other parameters depend on these."""
 
     character: str = parameter(
         DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml, .urdf or .xacro file"
@@ -29,6 +29,11 @@ class SharedSettings(Settings):
         unit="m, m, m, rad",
         minimum=-1e12,
     )
+
+
+class SharedSettings(Settings):
+    """What both sides are set to, whatever the character is."""
+
     rate: int = parameter(240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
     gravity: float = parameter(
         9.81, "gravity along -z", unit="m/s^2", maximum=1000.0, at_reset=True
@@ -43,7 +48,8 @@ class SharedSettings(Settings):
         return 1.0 / self.rate
 
 
-CHARACTER, COLLISION, PLACEMENT, RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
+CHARACTER, COLLISION, PLACEMENT = CharacterSource.declared()
+RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
 
 
 def collides(given: Mapping[str, object]) -> bool:

@@ -8,16 +8,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, LayoutError
 from msgs_config.parameters import Parameter, Value, Values, resolve
-from msgs_config.shared_parameters import (
-    CHARACTER,
-    COLLISION,
-    COMMAND_DELAY,
-    GRAVITY,
-    PLACEMENT,
-    RATE,
-    collides,
-    placed,
-)
+from msgs_config.shared_parameters import CharacterSource, SharedSettings, collides, placed
 from sim_node.frames import FrameNames
 from sim_node.initial_state import (
     INITIAL_STATE,
@@ -31,7 +22,7 @@ from sim_node.initial_state import (
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.settings import SimulationSettings
 
-_NEEDED_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the other parameters depend on these
+_NEEDED_FIRST = CharacterSource.declared()
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 CHARACTERS = Parameter(
@@ -42,7 +33,7 @@ CHARACTERS = Parameter(
     texts=True,
 )
 WORLD_PARAMETERS = [
-    *(RATE, GRAVITY, COMMAND_DELAY),
+    *SharedSettings.declared(),
     *SimulationSettings.declared(),
     *NodeSettings.declared(),
 ]
@@ -206,8 +197,8 @@ def _given_to(name: str, names: list[str], given: Mapping[str, object]) -> dict[
 def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
         first = {p.name: given[p.name] for p in _NEEDED_FIRST if p.name in given}
-        alone = resolve(_NEEDED_FIRST, first)
-        character = placed(load_character(str(alone[CHARACTER.name]), collides(alone)), alone)
+        name_or_path = CharacterSource.given(first).character
+        character = placed(load_character(name_or_path, collides(first)), first)
         values = resolve_alone(character, given)
         check_given(values, given)
         FrameNames.of(values).check(character)
