@@ -112,11 +112,8 @@ def make_plan(
     check_installed(controller)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
-    behaviour, planner = (
-        BehaviourSettings.of(controller).behaviour,
-        PlannerParameters.of(controller),
-    )
-    if planner.planner == PREDICTIVE or behaviour == STATE_MACHINE:
+    planner = PlannerParameters.of(controller).planner
+    if planner == PREDICTIVE or BehaviourSettings.of(controller).behaviour == STATE_MACHINE:
         defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
