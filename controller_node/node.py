@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
@@ -22,13 +23,16 @@ from controller_node.parameters import (
     check_world,
 )
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
+from msgs_config.bus.keyframe_publisher import KeyframePublisher
 from msgs_config.bus.live_parameters import LiveParameters
 from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
+from msgs_config.bus.publishing import publish_together
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.keyframe import read_keyframe
 from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
@@ -57,6 +61,7 @@ class ControllerNode(ComposableNode):
         self._setups = ControllerSetups(self._character, declared, values)
         self._log_warnings(self._character.warnings)
         self._log_warnings(self._setups.in_force.warnings)
+        self._going_on = self._read_keyframe()
         self._last_reply: Reply | None = None
         self._published_first: StampedState | None = None
         self._is_answering = False
@@ -72,6 +77,15 @@ class ControllerNode(ComposableNode):
     def _log_warnings(self, warnings: Iterable[str]) -> None:
         for warning in warnings:
             self.node.get_logger().warning(warning)
+
+    def _read_keyframe(self) -> int:
+        """Go on from the keyframe that the parameters name; its stamp, 0 if they name none."""
+        path = ControllerOptions.of(self._values).keyframes.file
+        if not path:
+            return 0
+        keyframe = read_keyframe(path)
+        self._setups.go_on(keyframe.memory)
+        return keyframe.stamp_ns
 
     def _open_topics(self) -> None:
         controller, logger = self._controller, self._once_logger
@@ -93,6 +107,13 @@ class ControllerNode(ComposableNode):
             self.node, self._layout, self._setups.in_force.driven, self._simulators.bound
         )
         self._stamped_topics = StampedTopics(self.node, controller, self._outputs, logger)
+        self._keyframes = KeyframePublisher(
+            self.node,
+            topics.CONTROLLER_KEYFRAME.of(self.node.get_name()),
+            controller.clock,
+            ControllerOptions.of(self._values).keyframes.period,
+            at_once=bool(self._going_on),
+        )
         self._publish_configuration()
 
     @property
@@ -205,6 +226,9 @@ class ControllerNode(ComposableNode):
     def _answer_state(
         self, raw: bytes, state: StampedState, episode_ns: int, surroundings: Surroundings
     ) -> None:
+        setup, session = self._setups.in_force, self._simulators.bound or ANONYMOUS
+        write = partial(setup.keyframe_format.write, setup.controller)
+        publish_together(self._keyframes.messages(state.stamp_ns, session, write))
         started = time.perf_counter()
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)
@@ -265,7 +289,9 @@ class ControllerNode(ComposableNode):
             self._begin_episode(state.stamp_ns)
         elif self._episode_ns is None:
             found_ns = self._simulators.episode_before(state.stamp_ns)
-            if found_ns is not None:
+            if found_ns is not None and state.stamp_ns == self._going_on:
+                self._episode_ns = found_ns  # the controller is in it already
+            elif found_ns is not None:
                 self._begin_episode(found_ns)
         if self._episode_ns is None or self._episode_ns > state.stamp_ns:
             return None

@@ -28,7 +28,7 @@ from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.messages.session import GivenSession
 from msgs_config.parameters import Parameter, Values, resolve
 from msgs_config.settings import Settings, parameter
-from msgs_config.shared_parameters import CharacterSource, SharedSettings
+from msgs_config.shared_parameters import CharacterSource, KeyframeSettings, SharedSettings
 
 _ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
@@ -62,6 +62,7 @@ class ControllerOptions(Settings):
         live=True,
     )
     balance_gains: BalanceGains = BalanceGains()
+    keyframes: KeyframeSettings = KeyframeSettings()
     session: GivenSession = GivenSession()
     gain_scale: GainScale = GainScale()
 

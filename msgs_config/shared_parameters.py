@@ -48,8 +48,22 @@ class SharedSettings(Settings):
         return 1.0 / self.rate
 
 
+class KeyframeSettings(Settings):
+    """How often a node publishes keyframes, and from which one it goes on."""
+
+    period: float = parameter(
+        5.0,
+        "of the keyframes from which a fork can begin; a large one comes less often; 0: none",
+        name="keyframe_period",
+        unit="s",
+        maximum=1e6,
+    )
+    file: str = parameter("", "file of a keyframe, from which the run goes on", name="keyframe")
+
+
 CHARACTER, COLLISION, PLACEMENT = CharacterSource.declared()
 RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
+KEYFRAME_PERIOD, KEYFRAME = KeyframeSettings.declared()
 
 
 def collides(given: Mapping[str, object]) -> bool:

@@ -3,7 +3,7 @@
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import GivenSession
 from msgs_config.settings import Settings, parameter, shared
-from msgs_config.shared_parameters import GRAVITY, RATE
+from msgs_config.shared_parameters import GRAVITY, RATE, KeyframeSettings
 from sim_node.frames import FrameNames
 
 _LARGEST_COUNT = 2**62
@@ -92,6 +92,7 @@ class NodeSettings(Settings):
     )
     sensing: SensingSettings = SensingSettings()
     frames: FrameNames = FrameNames()
+    keyframes: KeyframeSettings = KeyframeSettings()
     session: GivenSession = GivenSession()  # without one, the node makes one
 
     @property

@@ -11,6 +11,7 @@ from actuated_characters.bags.format import limits, metadata, storage
 from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.bags.format.mcap_file import McapFile
 from actuated_characters.bags.format.sqlite_file import SqliteFile
+from actuated_characters.bags.format.storage import Beginning
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
@@ -45,7 +46,13 @@ class RecordedMessage(NamedTuple):
             ) from error
 
 
-def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
+def read_messages(
+    path: Path,
+    topics: Collection[str] | None = None,
+    *,
+    first_ns: int = 0,
+    whole: Collection[str] = (),
+) -> Iterator[RecordedMessage]:
     """Yield the messages of a recording, or those of `topics` only.
 
     They come in the order of their log times; those of equal time in that of their publishing, and
@@ -54,12 +61,16 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
     Args:
         path: A rosbag2 directory, or a single .mcap or .db3 file that is complete.
         topics: Names as they are in the recording.
+        first_ns: Log time from which on they are read.
+        whole: Names of topics that are read from the start nevertheless.
 
     Raises:
         RecordingError: There is no complete recording at `path`, or it has none of a topic's name.
     """
     with _reading(path) as stack:
-        yield from _messages(path, topics, stack)
+        for message in _messages(path, topics, stack, Beginning(first_ns, frozenset(whole))):
+            if message.log_time_ns >= first_ns or message.topic in whole:
+                yield message
 
 
 def read_topics(path: Path) -> dict[str, str]:
@@ -99,7 +110,7 @@ def _files(
 
 
 def _messages(
-    path: Path, topics: Collection[str] | None, stack: ExitStack
+    path: Path, topics: Collection[str] | None, stack: ExitStack, beginning: Beginning
 ) -> Iterator[RecordedMessage]:
     bag, files = _files(path, stack)
     recorded = {topic.name for file in files for topic in file.topics.values()} | set(bag.topics)
@@ -107,7 +118,8 @@ def _messages(
     if unknown := sorted(names - recorded):
         raise RecordingError(one_of("topic", unknown[0], sorted(recorded)))
     streams = [
-        _read(path, place, file, names) for place, file in zip(bag.files, files, strict=True)
+        _read(path, place, file, names, beginning)
+        for place, file in zip(bag.files, files, strict=True)
     ]
     for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
         log_time_ns, published_ns, _, topic, stored, _ = message
@@ -151,10 +163,14 @@ def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> Mc
 
 
 def _read(
-    path: Path, place: Path, file: McapFile | SqliteFile, names: Collection[str]
+    path: Path,
+    place: Path,
+    file: McapFile | SqliteFile,
+    names: Collection[str],
+    beginning: Beginning,
 ) -> Iterator[storage.StoredMessage]:
     with _naming(path, place):
-        yield from file.messages_by_time(names)
+        yield from file.messages_by_time(names, beginning)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from actuated_characters.commands.common.recovering import recover_bag
 from actuated_characters.commands.common.settings import Commands, add_bag, add_command
 from actuated_characters.commands.common.tables import make_facts_table, make_table
 
@@ -34,11 +35,20 @@ def add_info(commands: "Commands[argparse.ArgumentParser]") -> None:
     )
     add_bag(info)
     info.add_argument("--json", action="store_true", help="print all of it as JSON")
+    info.add_argument(
+        "--recover",
+        action="store_true",
+        help="first make the bag complete, where its recorder was killed, the disk was full or a "
+        "copy broke off; the old one is kept beside it as BAG.damaged, and a run gets the figures "
+        "that it lacks. A complete bag is not touched",
+    )
 
 
 def _info(options: argparse.Namespace) -> None:
     from actuated_characters.report.facts import as_json, look_at
 
+    if options.recover:
+        recover_bag(options.bag)
     facts = look_at(options.bag)
     if options.json:
         print(as_json(facts))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.parameter_list import print_parameters
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.run_options import (
     ALL_SENSORS,
@@ -63,6 +64,11 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "option: say what there is to run.",
         ["run --clip walk --set controller_node.gain_scale.p:=0.5"],
     )
+    run.add_argument(
+        "--parameters",
+        choices=(*NODES, "recorder"),
+        help="list this node's parameters, with the values that the run would have, and end",
+    )
     add_character(run)
     add_tracked(run)
     run.add_argument(
@@ -104,6 +110,10 @@ def _run(options: argparse.Namespace) -> None:
     )
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
 
+    if options.parameters is not None:
+        plan = planned_run(options).plan
+        print_parameters(options.parameters, plan, _recording(options, plan))
+        return
     if options.view:
         require_extra("view", "--view")
     if not options.in_process:

@@ -114,11 +114,15 @@ class _Check:
         self._on_timeout = NodeSettings.of(values).on_timeout
         for first, end in self._episodes():
             previous = self._zero
-            for row in range(first, end):
+            for row in range(first + self._unknown_ticks(first), end):
                 tick = self._tick(row, first, previous)
                 if not same_bits(self._clip(tick.collected), self._recording.effort[row]):
                     yield self._settle(tick)
                 previous = tick.collected
+
+    def _unknown_ticks(self, first: int) -> int:
+        """The ticks from a row on in which commands act that are not in the recording."""
+        return self._delay if not first and self._recording.keyframe is not None else 0
 
     def _episodes(self) -> Iterator[tuple[int, int]]:
         """The first tick of each episode and the one after its last, which may be a reset."""
@@ -212,6 +216,9 @@ class _Check:
         for first, end in self._episodes():
             sent = deque(self._sent(first, end))
             known = [{0} for _ in range(self._layout.size)]  # bits that an entry can have; 0 is 0.0
+            if not first and self._recording.keyframe is not None:  # one may be held from before
+                held = self._recording.effort[: self._delay + 1].view(np.int64)
+                known = [{0, *bits} for bits in held.T.tolist()]
             for row in range(first, end):
                 answered = row - self._delay
                 while sent and first <= answered and sent[0][0] <= answered + later:

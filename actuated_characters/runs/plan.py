@@ -22,7 +22,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
 from msgs_config.parameters import Values
 from msgs_config.plain_values import as_plain, plain_parameters
-from msgs_config.shared_parameters import collides, placed
+from msgs_config.shared_parameters import KEYFRAME, KEYFRAME_PERIOD, collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, CharacterSettings, as_values, describe_start
 from sim_node.node_settings import NodeSettings
@@ -30,13 +30,17 @@ from sim_node.physics.probe import measure_probe
 from sim_node.physics.settings import STEADY_CONTACTS, SimulationSettings
 from sim_node.physics.short_links import describe_speed_bound
 
-SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
+SHARED = (
+    *("rate", "gravity", "placement", "collision", "command_delay_ticks"),
+    KEYFRAME_PERIOD.name,
+)
 """The same on both sides; set on one, they count on both."""
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
     "characters": "no run, which has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
+    KEYFRAME.name: "`fork`, whose run goes on from there",
     "max_ticks": "--duration",
     "session": "the run itself, which makes one for all its nodes",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",

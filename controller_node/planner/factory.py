@@ -74,8 +74,8 @@ def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
     plan = ReconstructedClip(character, clip).plan if is_clip else None
     if plan is None:
         raise ConfigurationError(
-            f"planner '{RECORDED}' plays the plan in a file of `reconstruct`; the clip '{clip}' "
-            "has none"
+            f"planner '{RECORDED}' plays the plan in a file of `motion reconstruct`; the clip "
+            f"'{clip}' has none"
         )
     if plan.rate_hz != rate:
         raise ConfigurationError(

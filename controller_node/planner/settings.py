@@ -54,7 +54,7 @@ class PlannerParameters(Settings, prefix="plan."):
     planner: str = parameter(
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
-        "model of the world, or the plan that is in the clip's file (of `reconstruct`)",
+        "model of the world, or the plan that is in the clip's file (of `motion reconstruct`)",
         name="planner",
         choices=(NO_PLANNER, PREDICTIVE, RECORDED),
     )

@@ -26,7 +26,7 @@ for command in (
     ["compare", "run", "fork"],
     ["info", "run"],
     ["report", "run"],
-    ["export", "run", "--output", "table"],
+    ["export", "run", "--output", "table.csv"],
 ):
     assert main(command) == 0, command
 ac.run("pendulum", 0.2, output="api", in_process=True)

@@ -26,11 +26,13 @@ from actuated_characters.bags.format.storage import (
     OFFERED_QOS,
     SIMULATED,
     TYPE_HASH,
+    Beginning,
     StoredMessage,
     StoredTopic,
 )
 from msgs_config.errors import RecordingError
 
+_ALL = Beginning()
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # a record's kind, and the length of its content
 _MESSAGE_HEAD = struct.Struct(
@@ -113,8 +115,12 @@ class McapFile:
     def _is_indexed(self) -> bool:
         return bool(self._chunks) and len(self.topics) >= max(self._count, 1)
 
-    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
+    def messages_by_time(
+        self, names: Collection[str], beginning: Beginning = _ALL
+    ) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time; a chunk is unpacked when its time comes.
+
+        Chunks that end before the beginning are left out, but for topics that are read whole.
 
         Raises:
             ValueError: the file is damaged, or more than a limit would have to be held.
@@ -124,16 +130,20 @@ class McapFile:
             yield from sorted(self._all_messages())
             return
         chosen = {number for number, topic in self.topics.items() if topic.name in names}
+        whole = {number for number in chosen if self.topics[number].name in beginning.whole}
         pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
-            if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
+            wanted = chosen if index.message_end_time >= beginning.log_time_ns else whole
+            if index.message_index_offsets and not index.message_index_offsets.keys() & wanted:
                 continue
             start_ns = index.message_start_time
             ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)
             yield from pending[:ready]
             del pending[:ready]
             size = sum(len(message.raw) for message in pending) + index.uncompressed_size
-            limits.check_size("chunks", max(size, index.chunk_length), limits.MOST_OF_CHUNK)
+            limits.check_size(
+                "overlapping chunks", max(size, index.chunk_length), limits.MOST_OF_CHUNK
+            )
             pending += self._read_chunk(index)
             pending.sort()
         yield from pending
@@ -289,7 +299,6 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, int, int]]:
 
 def _unpack_chunk(chunk: Chunk) -> bytes:
     """Return the records in a chunk. Raises an error of `limits.DAMAGED` if they cannot be."""
-    limits.check_size("a chunk", chunk.uncompressed_size, limits.MOST_OF_CHUNK)
     raw = limits.unpack("a chunk", chunk.data, chunk.compression, limits.MOST_OF_CHUNK)
     is_sound = len(raw) == chunk.uncompressed_size
     if not is_sound or chunk.uncompressed_crc not in (0, zlib.crc32(raw)):

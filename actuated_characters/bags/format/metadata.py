@@ -111,10 +111,10 @@ def storage_of(paths: Collection[str]) -> str:
 
 
 def recover_hint(bag: Path, does: str) -> str:
-    """The end of an error about a bag: what the command `recover` does, if it can do anything."""
+    """The end of an error about a bag: what `info --recover` does, if it can do anything."""
     run = bag.parent if bag.name == BAG else bag
     can = bag.is_dir() and any(file.suffix == SUFFIXES[MCAP] for file in bag.iterdir())
-    return f"; 'actuated_characters recover {run}' {does}" if can else ""
+    return f"; 'actuated_characters info {run} --recover' {does}" if can else ""
 
 
 def _missing(bag: Path) -> str:

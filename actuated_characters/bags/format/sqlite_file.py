@@ -10,6 +10,7 @@ from actuated_characters.bags.format.storage import (
     LOG_TIME,
     MOST_OF_METADATA,
     SIMULATED,
+    Beginning,
     StoredMessage,
     StoredTopic,
 )
@@ -59,8 +60,10 @@ class SqliteFile:
         except (sqlite3.OperationalError, RecordingError, KeyError, TypeError):
             return False
 
-    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
-        """Yield the messages on some topics by log time.
+    def messages_by_time(
+        self, names: Collection[str], beginning: Beginning | None = None
+    ) -> Iterator[StoredMessage]:
+        """Yield the messages on some topics by log time, also those before the beginning.
 
         Raises:
             ValueError, sqlite3.Error: the file is damaged, or a message is too large.
@@ -77,5 +80,5 @@ class SqliteFile:
                 yield StoredMessage(log_time_ns, published_ns, (place, 0), topic, raw)
         except sqlite3.DataError as error:
             raise limits.LimitError(
-                f"a message is larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
+                f"a message: larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
             ) from error

@@ -42,6 +42,13 @@ class StoredMessage(NamedTuple):
     number: int = 0  # its number among its channel's messages; 0 if it has none
 
 
+class Beginning(NamedTuple):
+    """What may be left out in front: the messages of before, but of some topics."""
+
+    log_time_ns: int = 0
+    whole: frozenset[str] = frozenset()
+
+
 def reason(error: Exception) -> str:
     """The text of a library's error in one line."""
     text = (error.strerror if isinstance(error, OSError) else None) or str(error)

@@ -136,6 +136,9 @@ def _first_difference(
     (recording, rows), earliest = first, None
     for quantity in _QUANTITIES:
         ours, theirs = _values(first, quantity), _values(second, quantity)
+        for each, its_rows in (first, second):
+            if quantity == "effort" and each.keyframe is not None:
+                ours[its_rows == 0] = theirs[its_rows == 0] = np.nan  # that is in the bag before
         differs = error_measures.different_bits(ours, theirs)
         if not differs.any():
             continue

@@ -1,4 +1,4 @@
-"""The command `actuated_characters reconstruct`: captured motion with joint torques alone."""
+"""The command `actuated_characters motion reconstruct`: a clip by joint torques alone."""
 
 import argparse
 import os
@@ -29,8 +29,8 @@ _FOLDER, _SUFFIX = Path("reconstructions"), ".json"
 _OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers", "planning_delay_ticks")
 
 
-def add_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
-    """Add the command to those of `actuated_characters`."""
+def add_motion_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters motion`."""
     command = add_command(
         commands,
         _reconstruct,
@@ -40,7 +40,7 @@ def add_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
         "window, until the character does it without root assistance (sampling-based motion "
         "control, Liu et al. 2010, with planned samples). The result is a clip file with the plan "
         "and the parameters of its run: play it with `run --clip FILE`.",
-        ["reconstruct --clip walk --cycles 4 --output walk.json"],
+        ["motion reconstruct --clip walk --cycles 4 --output walk.json"],
     )
     add_character(command)
     command.add_argument("--clip", default="walk", help="name of a clip, or a file (%(default)s)")
@@ -119,7 +119,9 @@ def _job(options: argparse.Namespace) -> "Job":
     given = node_settings(options.set, NODES)
     for name in _OWN:
         if name in given["controller_node"]:
-            raise ConfigurationError(f"--set controller_node.{name}: reconstruct sets it itself")
+            raise ConfigurationError(
+                f"--set controller_node.{name}: motion reconstruct sets it itself"
+            )
     simulator = {"rate": options.rate, "command_delay_ticks": options.delay_ticks}
     problem = Problem(
         options.character,
@@ -135,8 +137,8 @@ def _job(options: argparse.Namespace) -> "Job":
     problem.planned_pushes(plan)
     if NodeSettings.of(plan.simulator).tick_period:
         raise ConfigurationError(
-            "reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor a "
-            "'real_time_factor'"
+            "motion reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor "
+            "a 'real_time_factor'"
         )
     if options.output is None:
         output.parent.mkdir(exist_ok=True)
