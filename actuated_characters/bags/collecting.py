@@ -1,12 +1,12 @@
 """The messages of a bag, by the character or the world that they are of."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
 from actuated_characters.bags.keyframes import KeyframePlace
-from actuated_characters.bags.reader import read_messages, read_topics
+from actuated_characters.bags.reader import RecordedMessage, read_messages, read_topics
 from actuated_characters.bags.tracks import Beginnings, CharacterTimeline, WorldTimeline
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
@@ -31,11 +31,14 @@ def naming(bag: Path, timeline: CharacterTimeline | WorldTimeline) -> Iterator[N
 
 
 def collect(
-    bag: Path, begin: KeyframePlace | None = None
+    bag: Path,
+    begin: KeyframePlace | None = None,
+    messages: Iterable[RecordedMessage] | None = None,
 ) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
     """Collect the messages of each namespace, on topics that have the contract's names.
 
-    From the place of a keyframe on, where there is one, but the latched ones from the start.
+    From the place of a keyframe on, where there is one, but the latched ones from the start; or
+    those that are given.
     """
     characters: dict[str, CharacterTimeline] = {}
     worlds: dict[str, WorldTimeline] = {}
@@ -46,7 +49,9 @@ def collect(
         latched = [name for name in read_topics(bag) if name.endswith(_LATCHED)]
     # by topic: the timeline of its namespace, and the topic's name in that
     places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
-    for message in read_messages(bag, first_ns=first_ns, whole=latched):
+    if messages is None:
+        messages = read_messages(bag, first_ns=first_ns, whole=latched)
+    for message in messages:
         topic = message.topic
         if topic not in places:
             places[topic] = _timeline(topic, WorldTimeline, worlds, begins) or _timeline(

@@ -1,6 +1,6 @@
 """Reads the recordings of characters from a bag, as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -185,13 +185,20 @@ def read_recordings(path: Path, begin: KeyframePlace | None = None) -> tuple[Rec
         ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
-    characters, worlds = collect(bag, begin)
+    return make_recordings(bag, *collect(bag, begin))
+
+
+def make_recordings(
+    bag: Path, characters: Iterable[CharacterTimeline], worlds: Mapping[str, WorldTimeline]
+) -> tuple[Recording, ...]:
+    """Make recordings of what was collected from a bag.
+
+    Raises:
+        RecordingError: see `read_recordings`.
+    """
     known = [timeline for timeline in characters if timeline.rebuilt is not None]
     if not known:
-        raise RecordingError(
-            f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
-            f"which says what its states mean; {_what_it_is(read_topics(bag))}"
-        )
+        raise RecordingError(describe_foreign(bag, read_topics(bag)))
     recordings = []
     for timeline in known:
         with naming(bag, timeline):
@@ -199,14 +206,21 @@ def read_recordings(path: Path, begin: KeyframePlace | None = None) -> tuple[Rec
     return tuple(sorted(recordings, key=_place))
 
 
-def _what_it_is(types: Mapping[str, str]) -> str:
-    """What can be done with a bag whose topics are of these types."""
+def describe_foreign(bag: Path, types: Mapping[str, str]) -> str:
+    """What a bag is that is not of this project's simulator, and what can be done with it.
+
+    `types` are those of its topics.
+    """
     found = sorted(name for name, kind in types.items() if kind == JOINT_STATE)
-    if not found:
-        return f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    what = f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    if found:
+        what = (
+            f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
+            "`export` take it with --character ROBOT.urdf --topic TOPIC"
+        )
     return (
-        f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
-        "`export` take it with --character ROBOT.urdf --topic TOPIC"
+        f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
+        f"which says what its states mean; {what}"
     )
 
 

@@ -152,7 +152,8 @@ class CharacterTimeline:
         self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
         self._early_lost = False
-        self._gaps: list[tuple[int, int]] = []
+        self.gaps: list[tuple[int, int]] = []  # first and last of ticks whose states are missing
+        self.repeated = 0  # states that came again, as in a pause
         self._last_tick = 0
         self._decoder, self._references, self._commands = (JointStateDecoder() for _ in range(3))
         self._take: dict[str, Callable[[bytes, int], None]] = {
@@ -209,9 +210,9 @@ class CharacterTimeline:
             self.begins_amid, amid, self._amid = True, self._amid, []
             for raw, published_ns in amid:
                 self._take_state(raw, published_ns)
-        if self._gaps:
-            ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self._gaps[:_MOST_NAMED]]
-            more = len(self._gaps) - _MOST_NAMED
+        if self.gaps:
+            ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self.gaps[:_MOST_NAMED]]
+            more = len(self.gaps) - _MOST_NAMED
             tail = f" and {more} more times" if more > 0 else ""
             raise RecordingError(f"the states of ticks {', '.join(ranges)}{tail} are missing")
         assert self.rebuilt is not None
@@ -252,10 +253,11 @@ class CharacterTimeline:
                 self._amid.append((raw, published_ns))
                 return
         elif tick <= self._last_tick:
+            self.repeated += 1
             self._check_repeated(tick, state.position.tobytes() + state.velocity.tobytes())
             return
         elif tick > self._last_tick + 1:
-            self._gaps.append((self._last_tick + 1, tick - 1))
+            self.gaps.append((self._last_tick + 1, tick - 1))
         self._last_tick = tick
         states.stamps_ns.append(state.stamp_ns)
         states.published_ns.append(published_ns)
@@ -268,7 +270,7 @@ class CharacterTimeline:
         row, size = tick - self._clock.tick(self.states.stamps_ns[0]), self._layout.size
         entries = slice(row * size, (row + 1) * size)
         known = self.states.position[entries].tobytes() + self.states.velocity[entries].tobytes()
-        if row >= 0 and not self._gaps and content != known:
+        if row >= 0 and not self.gaps and content != known:
             raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
     def _take_reference(self, raw: bytes, published_ns: int) -> None:

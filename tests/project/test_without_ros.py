@@ -24,7 +24,7 @@ for command in (
     ["replay", "run"],
     ["fork", "run", "--at", "0.3", "--output", "fork"],
     ["compare", "run", "fork"],
-    ["info", "run"],
+    ["info", "run", "--ticks"],
     ["report", "run"],
     ["export", "run", "--output", "table.csv"],
 ):

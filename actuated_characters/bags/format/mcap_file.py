@@ -27,6 +27,7 @@ from actuated_characters.bags.format.storage import (
     SIMULATED,
     TYPE_HASH,
     Beginning,
+    FileStatistics,
     StoredMessage,
     StoredTopic,
 )
@@ -67,7 +68,7 @@ class McapFile:
         """Whether there was something compressed."""
         self._schemas: dict[int, Schema] = {}
         self._chunks: list[ChunkIndex] = []
-        self._count = 0  # channels that the file's statistics count
+        self._statistics: Statistics | None = None  # the file's own
         self._names: Collection[str] | None = None  # topics that are read; None: all
 
     @property
@@ -113,7 +114,27 @@ class McapFile:
 
     @property
     def _is_indexed(self) -> bool:
-        return bool(self._chunks) and len(self.topics) >= max(self._count, 1)
+        count = 0 if self._statistics is None else self._statistics.channel_count
+        return bool(self._chunks) and len(self.topics) >= max(count, 1)
+
+    def statistics(self) -> FileStatistics:
+        """The file's own statistics; those of one that has none are counted message by message.
+
+        Raises:
+            ValueError, KeyError: the file is damaged.
+        """
+        counts, known = Counter[str](), self._statistics
+        if known is not None:
+            for channel, count in known.channel_message_counts.items():
+                counts[self.topics[channel].name] += count
+            return FileStatistics(counts, known.message_start_time, known.message_end_time)
+        first_ns = last_ns = 0
+        for message in self.messages():
+            first_ns = min(first_ns, message.log_time_ns) if counts else message.log_time_ns
+            last_ns = max(last_ns, message.log_time_ns)
+            counts[message.topic.name] += 1
+        self._check_whole()
+        return FileStatistics(counts, first_ns, last_ns)
 
     def messages_by_time(
         self, names: Collection[str], beginning: Beginning = _ALL
@@ -265,7 +286,7 @@ class McapFile:
             elif isinstance(record, ChunkIndex):
                 self._chunks.append(record)
             elif isinstance(record, Statistics):
-                self._count = record.channel_count
+                self._statistics = record
 
 
 class _CutOffError(ValueError):

@@ -1,6 +1,6 @@
 """The `metadata.yaml` of a rosbag2 directory: read of any version of rosbag2, and written."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -32,6 +32,7 @@ class BagMetadata(NamedTuple):
     files: tuple[Path, ...]  # in the order in which they were written
     topics: tuple[str, ...]
     compression_mode: str  # FILE, MESSAGE or empty
+    content: Mapping[str, Any]  # all of it
 
 
 def read_metadata(bag: Path) -> BagMetadata:
@@ -101,10 +102,10 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
             problem = one_of(what, value, [choice for choice in choices if choice])
             raise RecordingError(f"cannot read recording {bag}: {problem}")
     present = tuple(bag / PurePath(path).name for path in paths)  # old paths include the bag's name
-    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
+    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode, content)
 
 
-def storage_of(paths: Collection[str]) -> str:
+def storage_of(paths: Iterable[str]) -> str:
     """The storage of a bag's files by the suffix of the first one; empty if that says none."""
     suffixes = {suffix for path in list(paths)[:1] for suffix in PurePath(path).suffixes}
     return next((name for name, suffix in SUFFIXES.items() if suffix in suffixes), "")

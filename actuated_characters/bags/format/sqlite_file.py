@@ -11,6 +11,7 @@ from actuated_characters.bags.format.storage import (
     MOST_OF_METADATA,
     SIMULATED,
     Beginning,
+    FileStatistics,
     StoredMessage,
     StoredTopic,
 )
@@ -59,6 +60,16 @@ class SqliteFile:
             return bool(content["custom_data"][LOG_TIME] == SIMULATED)
         except (sqlite3.OperationalError, RecordingError, KeyError, TypeError):
             return False
+
+    def statistics(self) -> FileStatistics:
+        """Count the messages without reading them. Raises sqlite3.Error: the file is damaged."""
+        rows = self._tables.execute(
+            "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages "
+            "GROUP BY topic_id"
+        ).fetchall()
+        counts = {self.topics[number].name: count for number, count, _, _ in rows}
+        first_ns = min((each for *_, each, _ in rows), default=0)
+        return FileStatistics(counts, first_ns, max((each for *_, each in rows), default=0))
 
     def messages_by_time(
         self, names: Collection[str], beginning: Beginning | None = None
