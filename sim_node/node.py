@@ -296,6 +296,7 @@ class SimNode(ComposableNode):
         starts = self._given.begin_episode(self._initial_states.newest())
         world = self._simulation.settings.world.changed(self._given.in_force.values)
         self._simulation.reset(world, starts or {})
+        self._keyframes.episode_ns = self._simulation.stamp_ns
         self._world.begin_episode()
         for each in self._characters:
             each.begin_episode()
