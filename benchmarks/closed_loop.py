@@ -30,7 +30,7 @@ def over_topics(plan: RunPlan, *, composed: bool = False) -> list[dict[str, str]
             nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)
             return nodes.reports
         nodes.start(topics.SIM_NODE, plan.simulator)
-        if not plan.simulator.integer("wait_for_subscribers"):
+        if not plan.simulator["wait_for_subscribers"]:
             nodes.wait_until(lambda: nodes.reports)  # the simulator's reports are heard from now on
         nodes.start(topics.CONTROLLER_NODE, plan.controller)
         nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)

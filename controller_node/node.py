@@ -16,7 +16,12 @@ from controller_node.interface.simulator_check import check_simulator
 from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
-from controller_node.parameters import PARAMETERS, character_parameters, check_world
+from controller_node.parameters import (
+    PARAMETERS,
+    ControllerOptions,
+    character_parameters,
+    check_world,
+)
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.keyframe_publisher import KeyframePublisher
 from msgs_config.bus.live_parameters import LiveParameters
@@ -28,16 +33,10 @@ from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.keyframe import read_keyframe
-from msgs_config.messages.session import ANONYMOUS, given_session
+from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
-from msgs_config.shared_parameters import (
-    DEFAULT_CHARACTER,
-    KEYFRAME,
-    KEYFRAME_PERIOD,
-    collides,
-    placed,
-)
+from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
 
 
 class ControllerNode(ComposableNode):
@@ -81,7 +80,7 @@ class ControllerNode(ComposableNode):
 
     def _read_keyframe(self) -> int:
         """Go on from the keyframe that the parameters name; its stamp, 0 if they name none."""
-        path = self._values.text(KEYFRAME.name)
+        path = ControllerOptions.of(self._values).keyframes.file
         if not path:
             return 0
         keyframe = read_keyframe(path)
@@ -93,7 +92,7 @@ class ControllerNode(ComposableNode):
         self._decoder = StateDecoder(self._layout, controller.clock)
         self._simulators = Simulators(
             self.node,
-            given_session(self._values),
+            ControllerOptions.of(self._values).session.id,
             controller.clock,
             lambda found: check_simulator(self._controller, self._character, self._values, found),
             logger,
@@ -112,7 +111,7 @@ class ControllerNode(ComposableNode):
             self.node,
             topics.CONTROLLER_KEYFRAME.of(self.node.get_name()),
             controller.clock,
-            self._values.number(KEYFRAME_PERIOD.name),
+            ControllerOptions.of(self._values).keyframes.period,
             at_once=bool(self._going_on),
         )
         self._publish_configuration()
@@ -261,7 +260,7 @@ class ControllerNode(ComposableNode):
         """Whether all that are to hear the first answer are there; later ones wait for none."""
         if self._last_reply is not None:
             return True
-        wanted = self._values.integer("wait_for_subscribers")
+        wanted = ControllerOptions.of(self._values).wait_for_subscribers
         return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:

@@ -24,10 +24,11 @@ from sim_node.interface.publishers import wait_for_subscribers
 from sim_node.interface.services import Services
 from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters, load_parameters
 from sim_node.physics.probe import measure_probe
-from sim_node.simulation_factory import change_world, make_simulation
+from sim_node.physics.settings import WorldSettings
+from sim_node.simulation_factory import make_simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus
 from sim_node.timing.rate_limiter import RateLimiter
@@ -52,10 +53,12 @@ class SimNode(ComposableNode):
         """
         super().__init__(node or ros_node(topics.SIM_NODE))
         loaded = load_parameters(self.node.given_parameters())
-        self._settings = make_node_settings(loaded.values)
+        self._settings = NodeSettings.of(loaded.values)
         self._build_simulation(loaded)
         self._given = EpisodeParameters(self.node, loaded, self._change_parameters)
-        self.session = self._settings.session or make_session(self.node.get_fully_qualified_name())
+        self.session = self._settings.session.id or make_session(
+            self.node.get_fully_qualified_name()
+        )
         """The session of all messages of this simulator."""
         self._once_logger = OnceLogger(self.node.get_logger())
         self._keyframes = SimulatorKeyframes(
@@ -73,7 +76,7 @@ class SimNode(ComposableNode):
         self._first_tick = self._simulation.tick
         self._control = RunControl()
         self._run_services = Services(
-            self.node, self._control, lambda: self._settings.step_ticks, self._resume, self._reset
+            self.node, self._control, lambda: self._settings.step_count, self._resume, self._reset
         )
 
     @property
@@ -88,7 +91,7 @@ class SimNode(ComposableNode):
 
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, and probe the engine."""
-        gravity = loaded.values.number("gravity")
+        gravity = WorldSettings.of(loaded.values).gravity
         self._samples = [measure_probe(each.character, gravity) for each in loaded.characters]
         self._simulation = make_simulation(loaded)
         self._initial_states = InitialStates(self.node, self._simulation.characters, loaded)
@@ -159,7 +162,7 @@ class SimNode(ComposableNode):
         self._keyframes.go_on()
         self._first_tick = self._simulation.tick
         # A run, which gives its simulator the session, has shown the warnings itself.
-        if not self._settings.session:
+        if not self._settings.session.id:
             log_warnings(self.node, self._given.in_force)
         self._publisher.publish_configurations(self._given.in_force)
         count = self._settings.wait_for_subscribers
@@ -291,8 +294,9 @@ class SimNode(ComposableNode):
         """Begin a new episode, now or when all awaited subscribers are there."""
         last_ns = self._simulation.stamp_ns
         starts = self._given.begin_episode(self._initial_states.newest())
-        world = change_world(self._simulation.settings.world, self._given.in_force.values)
+        world = self._simulation.settings.world.changed(self._given.in_force.values)
         self._simulation.reset(world, starts or {})
+        self._keyframes.episode_ns = self._simulation.stamp_ns
         self._world.begin_episode()
         for each in self._characters:
             each.begin_episode()
@@ -303,7 +307,7 @@ class SimNode(ComposableNode):
 
     def _change_parameters(self, values: Values) -> None:
         """Take changed parameters, at this tick's boundary."""
-        self._settings = make_node_settings(values)
+        self._settings = NodeSettings.of(values)
         if self._settings.tick_period != self._rate_limiter.period:
             self._rate_limiter.change(self._settings.tick_period, time.monotonic())
         for each in self._characters:

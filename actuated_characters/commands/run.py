@@ -119,7 +119,7 @@ def _run(options: argparse.Namespace) -> None:
     if not options.in_process:
         require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)
-    plan, motion = run.plan, _motion_name(run.plan)
+    plan, motion = run.plan, run.plan.motion_name
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     if options.output is None and not options.overwrite:
@@ -272,14 +272,6 @@ def _run_plan(
     )
     has_states = throws and not options.no_record
     return describe_hits(plan, throws, read_states(directory) if has_states else None)
-
-
-def _motion_name(plan: "RunPlan") -> str:
-    """The name of the motion that a plan tracks."""
-    if plan.controller.text("behaviour") == "state_machine":
-        return plan.controller.text("machine")
-    kind = plan.controller.text("reference")
-    return plan.controller.text(kind) if kind in ("clip", "keyframes") else kind
 
 
 def _reference(options: argparse.Namespace) -> dict[str, object]:

@@ -30,34 +30,38 @@ from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import Turns, ros_node
-from msgs_config.bus.node import BusNode, Publisher, Subscription
+from msgs_config.bus.node import BusNode, Publisher, Subscription, declared_settings
 from msgs_config.errors import ReplayError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import SESSION, given_session, read_session
+from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.settings import Settings, parameter
 from msgs_config.versions import describe_changes, installed_versions
 
 _LATEST = 2**62  # ns
-PARAMETERS = [
-    Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter(
-        "stamp_ns", 0, "of the keyframe that the recording is read from; 0: all", maximum=_LATEST
-    ),
-    Parameter("log_time_ns", 0, "of that keyframe in the bag", maximum=_LATEST),
-    Parameter("row", 0, "state from which on the fork differs, the first one being 0"),
-    Parameter("ticks", 1, "length of what is repeated and of what is new"),
-    Parameter("later_inputs", True, "repeat what was sent from that state on, too"),
-    Parameter("settings", "{}", "new parameters of nodes from that state on, JSON by node"),
-    Parameter("file", "pushes.json", "new pushes, as a run writes them"),
-    Parameter("throws", "throws.json", "new throws, as a run writes them"),
-    Parameter("wait_for_subscribers", 1, "begin when this many subscribe to external_wrench"),
-    Parameter("throw_subscribers", 1, "likewise to throw"),
-    SESSION,
-]
+
+
+class ForkSettings(Settings):
+    """Which run is forked where, and what is new from there on."""
+
+    recording: str = parameter("", "the bag, or the directory of its run")
+    stamp_ns: int = parameter(
+        0, "of the keyframe that the recording is read from; 0: all", maximum=_LATEST
+    )
+    log_time_ns: int = parameter(0, "of that keyframe in the bag", maximum=_LATEST)
+    row: int = parameter(0, "state from which on the fork differs, the first one being 0")
+    ticks: int = parameter(1, "length of what is repeated and of what is new")
+    later_inputs: bool = parameter(True, "repeat what was sent from that state on, too")
+    settings: str = parameter("{}", "new parameters of nodes from that state on, JSON by node")
+    file: str = parameter("pushes.json", "new pushes, as a run writes them")
+    throws: str = parameter("throws.json", "new throws, as a run writes them")
+    wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
+    throw_subscribers: int = parameter(1, "likewise to throw")
+    session: GivenSession = GivenSession()
+
 
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
@@ -77,34 +81,32 @@ class ForkNode(Player):
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be repeated.
         """
         super().__init__(node or ros_node("fork"), silent=True)
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        path, self._row = Path(values.text("recording")), values.integer("row")
-        stamp_ns, log_time_ns = values.integer("stamp_ns"), values.integer("log_time_ns")
+        settings = declared_settings(self.node, ForkSettings)
+        path, self._row = Path(settings.recording), settings.row
+        stamp_ns, log_time_ns = settings.stamp_ns, settings.log_time_ns
         begin = KeyframePlace(stamp_ns, log_time_ns) if stamp_ns else None
         self._recording = recording = read_recordings(path, begin)[0]
-        point = ForkPoint(self._row, values.integer("ticks"), values.flag("later_inputs"))
+        point = ForkPoint(self._row, settings.ticks, settings.later_inputs)
         self._stops = recorded_stops(recording, point)
         pace = float(recording.parameters.get(_PACE) or 0.0)
         self._tick_clock, self._first_tick = clock_of(recording), first_tick_of(recording)
-        self._add_new(pace, values)
+        self._add_new(pace, settings)
         rare = read_rare_messages(path, recording).requests
         self._requests = {row: rare[row] for row in rare if point.repeats(row)}
-        self._session = given_session(values)
+        self._session = settings.session.id
         self._throw_codec = ThrowCodec(self._session)
         self._state_decoder, self._torque_decoder = JointStateDecoder(), JointStateDecoder()
         self._compared = 0  # states
         self._answered_ns = 0  # stamp of the last answer
-        self._open_topics(values)
+        self._open_topics(settings)
 
-    def _open_topics(self, values: Values) -> None:
-        # with the parameters that say how many subscribers to wait for
-        pushed, thrown = "wait_for_subscribers", "throw_subscribers"
+    def _open_topics(self, settings: ForkSettings) -> None:
+        pushed, thrown = settings.wait_for_subscribers, settings.throw_subscribers
         requested = {name for each in self._requests.values() for name, _ in each}
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         self._outgoing: dict[str, tuple[Publisher, int]] = {
-            topic.name: (self.node.publisher(topic), values.integer(count)) for topic, count in sent
+            topic.name: (self.node.publisher(topic), count) for topic, count in sent
         }
         self._clients = {
             topics.SIM_NODE: self.node.client(topics.SIM_NODE, _SERVICES),
@@ -240,12 +242,12 @@ class ForkNode(Player):
             raise ReplayError("; ".join(filter(None, (str(difference), changed))))
         self._compared += 1
 
-    def _add_new(self, pace: float, values: Values) -> None:
+    def _add_new(self, pace: float, settings: ForkSettings) -> None:
         """Add the new inputs to stops: parameters at the fork, others in their episode.
 
         From the fork on the simulator has the recorded `pace`, unless there is a new one.
         """
-        stops, row, new = self._stops, self._row, json.loads(values.text("settings"))
+        stops, row, new = self._stops, self._row, json.loads(settings.settings)
         if controller := new.get(topics.CONTROLLER_NODE):
             stops[row].settings.append((topics.CONTROLLER_NODE, controller))
         simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
@@ -257,7 +259,7 @@ class ForkNode(Player):
             at = self._tick_clock.tick(planned.stamp_ns) - self._first_tick
             return stops[max(begin for begin in begins if begin <= at) + 1]
 
-        for push in read_pushes(Path(values.text("file"))):
+        for push in read_pushes(Path(settings.file)):
             stop_of(push).pushes.append(push)
-        for throw in read_throws(Path(values.text("throws"))):
+        for throw in read_throws(Path(settings.throws)):
             stop_of(throw).throws.append(throw)

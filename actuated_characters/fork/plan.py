@@ -34,6 +34,7 @@ from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.parameters import Value, Values
 from msgs_config.versions import installed_versions
 from sim_node import parameters as simulator_parameters
+from sim_node.node_settings import NodeSettings
 
 _AS_A_RUN: Mapping[str, Value] = {  # which ends with an error, rather than pause
     **{"on_fault": "abort", "on_timeout": "abort"},
@@ -243,7 +244,7 @@ def _run_plan(past: _Past, ticks: int) -> RunPlan:
     """The recorded run, as one to be started."""
     recording = past.recording
     character, simulator = recording.character, simulator_values(recording)
-    timeout = simulator.number("lockstep_timeout") or _LOCKSTEP_TIMEOUT
+    timeout = NodeSettings.of(simulator).lockstep_timeout or _LOCKSTEP_TIMEOUT
     simulator = Values({**simulator, **_AS_A_RUN, "lockstep_timeout": timeout, "max_ticks": ticks})
     given = {**first_parameters(recording), "wait_for_subscribers": 0}
     controller = controller_parameters.resolve_for(character, given)

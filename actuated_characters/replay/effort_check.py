@@ -20,7 +20,9 @@ from actuated_characters.replay.world import of_character, simulator_values
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import LayoutError
 from msgs_config.parameters import Values
-from sim_node.node_settings import make_node_settings
+from sim_node.initial_state import CharacterSettings
+from sim_node.node_settings import NodeSettings
+from sim_node.physics.settings import SimulationSettings
 
 _ARRIVAL_TICKS = 2  # ticks by which the arrival of a command without a stamp is uncertain
 
@@ -86,7 +88,7 @@ def check_commands(recording: Recording) -> CommandCheck:
     check = _Check(recording, values)
     found = (
         check.check_realtime()
-        if make_node_settings(values).is_realtime
+        if NodeSettings.of(values).is_realtime
         else check.check_lockstep(values)
     )
     difference = next((each for each in found if each is not None), None)
@@ -100,14 +102,16 @@ class _Check:
         self._recording = recording
         self._layout = recording.layout
         self._limits = recording.character.effort_limits()
-        self._commanded: BoolArray = self._layout.mask(values.texts("commanded_joints"))
-        self._delay = values.integer("command_delay_ticks")
+        self._commanded: BoolArray = self._layout.mask(
+            CharacterSettings.of(values).commanded_joints
+        )
+        self._delay = SimulationSettings.of(values).command_delay_ticks
         self._zero = np.zeros(self._layout.size)
         self.silent_rows: list[int] = []
 
     def check_lockstep(self, values: Values) -> Iterator[Difference | None]:
         """Yield what is wrong with a tick; None where other commands explain it."""
-        self._on_timeout = values.text("on_timeout")
+        self._on_timeout = NodeSettings.of(values).on_timeout
         for first, end in self._episodes():
             previous = self._zero
             for row in range(first + self._unknown_ticks(first), end):

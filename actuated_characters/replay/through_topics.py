@@ -32,8 +32,8 @@ from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, COLLISION, KEYFRAME, PLACEMENT
-from sim_node.parameters import CHARACTERS
-from sim_node.world_parameters import WORLD_PARAMETERS
+from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
+from sim_node.physics.settings import SimulationSettings
 
 _OF_A_CHARACTER = (
     COLLISION.name,
@@ -129,7 +129,8 @@ def _simulator_parameters(
         "lockstep_timeout": 0.0,
         "on_timeout": "abort",
         "on_fault": "abort",
-        "wrench_duration": 1.0 / first.integer("rate"),  # each tick's pushes are sent for it alone
+        "wrench_duration": 1.0
+        / SimulationSettings.of(first).rate_hz,  # each tick's pushes are sent for it alone
     }
 
 

@@ -18,11 +18,11 @@ from msgs_config.versions import describe_changes, installed_versions
 from sim_node.initial_state import changed_start
 from sim_node.interface.keyframes import read_memory
 from sim_node.parameters import resolve_alone
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup
-from sim_node.physics.simulation import Simulation, SimulationSettings, Snapshot
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.simulation import Simulation, Snapshot
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import change_world, make_character_setup, make_simulation_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states that a stopped recorder may have more of one character than of another
@@ -96,7 +96,7 @@ def changes_of_reset(
         before, after = (simulator_values(recording, each) for each in (row - 1, row))
         if (state := changed_start(before, after)) is not None:
             states[recording.world.name] = state
-    return ResetChanges(change_world(world, simulator_values(together[0], row)), states)
+    return ResetChanges(world.changed(simulator_values(together[0], row)), states)
 
 
 def of_character(recording: Recording) -> str:
@@ -183,8 +183,8 @@ def _settings(recording: Recording, values: Values) -> SimulationSettings:
     terrain = recording.world.terrain
     if terrain is not None:
         values = Values(values | {"terrain": "none"})
-    elif values.text("terrain") not in _GROUNDS:
-        raise RecordingError(f"the recording lacks its terrain, {values.text('terrain')}")
+    elif (path := SimulationSettings.of(values).terrain) not in _GROUNDS:
+        raise RecordingError(f"the recording lacks its terrain, {path}")
     settings = make_simulation_settings(values)
     world = replace(settings.world, terrain=terrain)
     return replace(settings, world=world, command_delay_ticks=0)

@@ -74,7 +74,7 @@ def moments(trial: Trial, machine: Machine, plan: RunPlan | None = None) -> Iter
     reference = plan.reference
     assert isinstance(reference, SteeredReference)
     character, rate = plan.character, trial.rate
-    kit = kit_of(machine, character, plan.simulator.number("gravity"), 1.0 / rate)
+    kit = kit_of(machine, character, plan.simulation.world.gravity, 1.0 / rate)
     behaviour, clock = StateMachine(kit), TickClock(rate)
     gains = make_controller_settings(character, plan.controller).gains
     limits = EffortLimits(character.layout, gains.effort_limits)

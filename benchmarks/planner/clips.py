@@ -163,7 +163,7 @@ def _plan(task: Task, character: str) -> RunPlan:
 
 
 def _rate(plan: RunPlan) -> int:
-    return plan.simulator.integer("rate")
+    return plan.simulation.rate_hz
 
 
 def _row(attempts: Sequence[Attempt]) -> list[str]:

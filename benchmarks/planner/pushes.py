@@ -70,7 +70,7 @@ class _Watch:
 
     def __init__(self, plan: RunPlan) -> None:
         self._centre_at = DynamicsModel(plan.character).centre_of_mass_at
-        self.rate = plan.simulator.integer("rate")
+        self.rate = plan.simulation.rate_hz
         self._fall = FallWatch(PostureReader(plan.character), 1.0 / EVERY)
         self._time = 0.0  # s
         self.errors: list[float] = []

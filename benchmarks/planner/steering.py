@@ -74,7 +74,7 @@ def attempt(task: Task) -> DriveResult:
     begun = time.monotonic()
     roots, fell = _roots(plan)
     wall = time.monotonic() - begun
-    reference, rate = plan.reference, plan.simulator.integer("rate")
+    reference, rate = plan.reference, plan.simulation.rate_hz
     assert isinstance(reference, SteeredReference)
     courses = [reference.course(tick) for tick in range(1, len(roots) + 1)]
     course = np.array([(each.x, each.y) for each in courses])
@@ -102,7 +102,7 @@ def _plan(task: Task) -> RunPlan:
     )
     if task.is_eight:
         return plan_velocities(plan, EIGHT)[0]
-    reference, rate = plan.reference, plan.simulator.integer("rate")
+    reference, rate = plan.reference, plan.simulation.rate_hz
     assert isinstance(reference, SteeredReference)
     for tick in range(0, round(DRIVEN * rate) + 1, rate // 10):
         command = VelocityCommand(tick, reference.limits.speed)
@@ -112,7 +112,7 @@ def _plan(task: Task) -> RunPlan:
 
 def _roots(plan: RunPlan) -> tuple[FloatArray, bool]:
     """Places of the root on the ground (t, 2) m after each tick, and whether it fell at the end."""
-    fall = FallWatch(PostureReader(plan.character), plan.simulator.integer("rate"))
+    fall = FallWatch(PostureReader(plan.character), plan.simulation.rate_hz)
     roots: list[tuple[float, float]] = []
     try:
         for tick in ticks_in_process(plan):

@@ -10,7 +10,7 @@ from msgs_config.memory import MemoryFormat
 from msgs_config.messages import topics
 from msgs_config.messages.keyframe import read_keyframe
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import KEYFRAME, KEYFRAME_PERIOD
+from msgs_config.shared_parameters import KeyframeSettings
 from sim_node.physics.simulation import Simulation, Snapshot
 
 _PACKAGES = ("sim_node.physics", "msgs_config.character", "msgs_config.messages")
@@ -49,15 +49,15 @@ class SimulatorKeyframes:
         """
         self._simulation, self._session = simulation, session
         self._format = keyframe_format(simulation)
-        path = values.text(KEYFRAME.name)
-        self._given = read_keyframe(path) if path else None
+        settings = KeyframeSettings.of(values)
+        self._given = read_keyframe(settings.file) if settings.file else None
         self.episode_ns = simulation.stamp_ns
         """Stamp of the first state of the episode."""
         self._publisher = KeyframePublisher(
             node,
             topics.KEYFRAME.of(node.get_name()),
             simulation.clock,
-            values.number(KEYFRAME_PERIOD.name),
+            settings.period,
             at_once=self._given is not None,
         )
 

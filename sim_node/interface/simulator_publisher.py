@@ -12,7 +12,7 @@ from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.keyframes import SimulatorKeyframes
 from sim_node.interface.publishers import Publishers
 from sim_node.interface.world_interface import WorldInterface
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
@@ -58,10 +58,12 @@ class SimulatorPublisher:
 
     def change(self, parameters: SimulatorParameters, since_ns: int | None) -> None:
         """Go on with other parameters, which are published before the next episode's messages."""
-        gravity = parameters.values.number("gravity")
+        sensing = NodeSettings.of(parameters.values).sensing
         for each in self.of_characters:
-            each.change_sensing(make_node_settings(parameters.values).sensing)
-        self._samples = [measure_probe(each.character, gravity) for each in parameters.characters]
+            each.change_sensing(sensing)
+        self._samples = [
+            measure_probe(each.character, sensing.gravity) for each in parameters.characters
+        ]
         if self._is_configured:
             self.publish_configurations(parameters, since_ns)
             # each latched topic keeps one message: the next must not push it out

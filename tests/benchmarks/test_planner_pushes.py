@@ -45,7 +45,7 @@ def test_walks_are_pushed_as_their_kind_says() -> None:
 def test_a_ball_arrives_from_its_side_at_its_time() -> None:
     (walk,) = walks("balls", 1, ())
     plan = _plan(walk)
-    clock = TickClock(plan.simulator.integer("rate"))
+    clock = TickClock(plan.simulation.rate_hz)
 
     throws = _throws(plan, walk)
 

@@ -110,7 +110,7 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import SearchSettings
-    from sim_node.node_settings import make_node_settings
+    from sim_node.node_settings import NodeSettings
 
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
     if workers < 1:
@@ -135,7 +135,7 @@ def _job(options: argparse.Namespace) -> "Job":
     settings.check()
     plan = problem.plan()  # mistakes are reported before anything begins
     problem.planned_pushes(plan)
-    if make_node_settings(plan.simulator).tick_period:
+    if NodeSettings.of(plan.simulator).tick_period:
         raise ConfigurationError(
             "motion reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor "
             "a 'real_time_factor'"

@@ -20,22 +20,24 @@ from actuated_characters.replay.players.simulator_inputs import SimulatorInputs,
 from actuated_characters.replay.world import read_world
 from msgs_config.arrays import FloatArray
 from msgs_config.bus.composition import Turns, ros_node
-from msgs_config.bus.node import BusNode
+from msgs_config.bus.node import BusNode, declared_settings
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import SESSION, given_session, read_session
+from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.parameters import Parameter, resolve
+from msgs_config.settings import Settings, parameter
 
-PARAMETERS = [
-    Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter("world", 0, "which of the bag's worlds to play, counted from 0"),
-    Parameter("states", "states.npz", "where the states go that come back"),
-    SESSION,
-]
+
+class RecordedControllerSettings(Settings):
+    """Which recording is played, and where what comes back goes."""
+
+    recording: str = parameter("", "the bag, or the directory of its run")
+    world: int = parameter(0, "which of the bag's worlds to play, counted from 0")
+    states: str = parameter("states.npz", "where the states go that come back")
+    session: GivenSession = GivenSession()
 
 
 class RecordedController(Player):
@@ -50,15 +52,14 @@ class RecordedController(Player):
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be played.
         """
         super().__init__(node or ros_node("player"))
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        self._file = Path(values.text("states"))
-        world, _ = read_world(Path(values.text("recording")), values.integer("world"))
+        settings = declared_settings(self.node, RecordedControllerSettings)
+        self._file = Path(settings.states)
+        world, _ = read_world(Path(settings.recording), settings.world)
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
         self._first_tick = first_tick_of(world[0])
         self._simulator = self.node.client(topics.SIM_NODE, {"reset": False})
         self._changes = reset_changes(world)
-        session = given_session(values)
+        session = settings.session.id
         self._throw_codec = ThrowCodec(session)
         self._throw_topic = self.node.publisher(topics.THROW)
         inputs = make_inputs(world)

@@ -27,7 +27,8 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.topic import Quality, Topic
-from sim_node.sensors.readers import SensingSettings, make_readers
+from sim_node.node_settings import SensingSettings
+from sim_node.sensors.readers import make_readers
 from tests.support.physics import simulation
 from tests.support.ros import Client, Process, Processes, SimulatorClient, tick_of, wait_until
 
@@ -192,7 +193,7 @@ def test_a_run_records_the_sensors_and_the_states_alone_give_the_same_readings(
     recording, simulated = read_recording(bag), simulation("humanoid").simulated
     readers = {
         sensor.topic: reader
-        for sensor, reader in make_readers(simulated, SensingSettings(1.0 / 240.0, 9.81, 0))
+        for sensor, reader in make_readers(simulated, SensingSettings(240, 9.81, 0))
     }
     expected, before = [], None
     for stamp, position, velocity in zip(

@@ -19,7 +19,6 @@ from actuated_characters.viewer.recorded.plots import curves
 from controller_node import parameters as controller
 from controller_node.references.factory import make_motion
 from msgs_config.messages.configuration import SINCE
-from msgs_config.parameters import resolve
 from tests.support.changed_episodes import (
     BEGINS,
     MOON,
@@ -62,7 +61,7 @@ def begin_of(clip: str) -> np.ndarray:
     """The position (n,) in which a clip of the humanoid begins."""
     humanoid = character("humanoid")
     given = {"character": "humanoid", "reference": "clip", "clip": clip}
-    values = resolve(controller.PARAMETERS + controller.character_parameters(humanoid), given)
+    values = controller.resolve_for(humanoid, given)
     return make_motion(humanoid, values).first_state().position
 
 

@@ -209,7 +209,7 @@ def test_root_that_is_not_commanded_switches_assistance_off() -> None:
 
     plan = make_plan("humanoid", 2.0, {"reference": "hold"}, {"commanded_joints": joints}, {})
 
-    assert plan.controller.flag("root_assistance") is False
+    assert plan.controller["root_assistance"] is False
 
 
 def test_two_runs_at_once_take_different_domains_and_do_not_hear_each_other(

@@ -12,4 +12,4 @@ def test_the_plan_has_the_machine_that_is_tried_and_no_other(tmp_path: Path) -> 
 
     plan = Trial(1.0).plan(read_machine(str(file)))
 
-    assert plan.controller.text("machine") == str(file)
+    assert plan.controller["machine"] == str(file)
