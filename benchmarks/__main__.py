@@ -8,9 +8,14 @@ from msgs_config.runtime.process import limit_threads, middleware_settings
 
 limit_threads()
 
-from benchmarks.support.needed import need  # noqa: E402 - after the limit on threads
+from msgs_config.errors import ConfigurationError  # noqa: E402 - after the limit on threads
+from msgs_config.extras import require_extra  # noqa: E402
 
-need("make bench", "plan", "view")
+try:
+    for extra in ("plan", "view"):
+        require_extra(extra, "make bench")
+except ConfigurationError as error:
+    sys.exit(f"error: {error}")
 
 from rich.console import Console  # noqa: E402
 

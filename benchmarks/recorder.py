@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.runs.plan import RunPlan, make_plan
+from benchmarks.closed_loop import WALK
 from benchmarks.support.nodes import Nodes, processor_time
 from benchmarks.support.ratios import Ratio
 from msgs_config.messages import topics
@@ -29,15 +30,13 @@ class Timing:
 
 def walk(duration: float) -> RunPlan:
     """The run that is measured: the humanoid's walk by stable PD, at 1 kHz."""
-    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
-    return make_plan(CHARACTER, duration, reference, {"rate": RATE}, {})
+    return make_plan(CHARACTER, duration, WALK, {"rate": RATE}, {})
 
 
 def _real_time() -> RunPlan:
     """The same messages in real time, of a ragdoll: late efforts cannot make it diverge."""
-    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
     simulator = {"rate": RATE, "mode": "realtime"}
-    return make_plan(CHARACTER, _REAL_TIME_DURATION, reference, simulator, {"law": "zero"})
+    return make_plan(CHARACTER, _REAL_TIME_DURATION, WALK, simulator, {"law": "zero"})
 
 
 def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
@@ -48,22 +47,14 @@ def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
             recorder = nodes.start(topics.RECORDER_NODE, {"directory": directory})
         listeners = {"wait_for_subscribers": 1 + recorded}
         simulator, controller = {**plan.simulator, **listeners}, {**plan.controller, **listeners}
-        if composed:
-            nodes.start_composed(simulator, controller)
-        else:
-            nodes.start(topics.CONTROLLER_NODE, controller)
-            nodes.start(topics.SIM_NODE, simulator)
-        nodes.wait_until(lambda: _tick(nodes) > 1)
-        first, began = _tick(nodes), time.monotonic()
+        nodes.start_loop(simulator, controller, composed=composed)
+        nodes.wait_until(lambda: nodes.tick > 1)
+        first, began = nodes.tick, time.monotonic()
         busy = processor_time(recorder) if recorder else 0.0
-        nodes.wait_until(lambda: _tick(nodes) > plan.ticks)
+        nodes.wait_until(lambda: nodes.tick > plan.ticks)
         taken = time.monotonic() - began
         used = processor_time(recorder) - busy if recorder else 0.0
-        return Timing((_tick(nodes) - first) / taken, used / taken)
-
-
-def _tick(nodes: Nodes) -> int:
-    return int(nodes.reports[-1]["tick"]) if nodes.reports else 0
+        return Timing((nodes.tick - first) / taken, used / taken)
 
 
 def measure_recorder(console: Console) -> list[Ratio]:
@@ -88,9 +79,10 @@ def measure_recorder(console: Console) -> list[Ratio]:
     label = f"in real time, {real_time.ticks_per_s:.0f} ticks a second"
     table.add_row(label, "", f"{real_time.share:.0%}")
     console.print(table)
+    how = "a tick beside it / one without it"
     return [
-        Ratio("recorder, slow-down", _median(ratios[False]), "a tick beside it / one without it"),
-        Ratio("recorder, slow-down, composed", _median(ratios[True]), "likewise, composed"),
+        Ratio("recorder, slow-down", _median(ratios[False]), how),
+        Ratio("recorder, slow-down, composed", _median(ratios[True]), how),
         Ratio("recorder, share", shares[False], "its processor time / the run's"),
     ]
 

@@ -1,22 +1,25 @@
 """The impulse that half of the walks bear, by direction, as a picture."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
+from benchmarks.tables.case import Case, Fact
 from msgs_config.arrays import BoolArray, FloatArray
 
 STEPS = 30  # of Newton's method
 RIDGE = 0.01  # without it few walks leave the fit without a minimum
 
 
-def draw(impulses: Sequence[tuple[float, float]], borne: Sequence[bool], file: Path) -> None:
-    """Draw pushes in N s, forwards and to the left, and whether each was borne."""
-    pushes, is_upright = np.array(impulses), np.array(borne)
+def draw(results: Sequence[tuple[Case, Mapping[str, Fact]]], file: Path) -> None:
+    """Draw walks that were pushed once for 0.2 s, and whether each stayed upright."""
+    forces = [case.pushes[0].removeprefix("root:").split(",")[:2] for case, _ in results]
+    pushes = 0.2 * np.array(forces, dtype=float)  # N s, forwards and to the left
+    is_upright = np.array([bool(facts["upright"]) for _, facts in results])
     sizes, sides = np.hypot(*pushes.T), np.arctan2(pushes[:, 1], pushes[:, 0])
     figure = Figure(figsize=(6.0, 6.0), layout="constrained")
     axes = figure.add_subplot(projection="polar")

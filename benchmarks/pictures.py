@@ -1,11 +1,10 @@
-"""Pictures of planned motion, the reference transparent: `python -m benchmarks.planner.pictures`.
+"""Pictures of planned motion, the reference transparent: `python -m benchmarks.pictures`.
 
 Those of docs/planning.md, all clips at some of their moments and two moving pictures, and the
 README's. It takes a quarter of an hour; `--only hero.webp` makes one of them.
 """
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,9 +15,13 @@ from rich.console import Console
 from rich.progress import track
 
 from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.render.engine.renderer import Picture
 from actuated_characters.render.movie import GhostPlace, Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip
+from actuated_characters.runs.in_process import run_in_process
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.wrenches import parse_push
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import available_clips, read_clip
 
@@ -27,14 +30,13 @@ TILE, FRAME, WIDE = (150, 170), (400, 260), (640, 360)  # pixels
 FRAMES_A_SECOND = 20
 CLIPS = "planned_clips.webp"
 SIDEWAYS, FORWARDS = "root:0,300,0@1.5", "root:240,0,0@5.5"  # N, for 0.2 s
-Runs = list[tuple[str, float, tuple[str, ...]]]
-MOVING: dict[
-    str, tuple[tuple[int, int], Runs]
-] = {  # file: size, and of each run its clip, duration in s and pushes
+Motion = tuple[str, float, tuple[str, ...]]
+MOVING: dict[str, tuple[tuple[int, int], list[Motion]]] = {
     "planned_backflip.webp": (FRAME, [("backflip", 1.75, ())]),
     "planned_pushes.webp": (FRAME, [("walk", 9.5, (SIDEWAYS, FORWARDS))]),
     "hero.webp": (WIDE, [("walk", 4.0, (SIDEWAYS,)), ("backflip", 1.75, ())]),
 }
+"""By file its size, and of each run its clip, duration in s and pushes."""
 
 
 def main() -> int:
@@ -60,22 +62,16 @@ def main() -> int:
     return 0
 
 
-def simulate(clip: str, duration: float, pushes: tuple[str, ...] = ()) -> Recording:
+def simulate(clip: str, duration: float, texts: tuple[str, ...] = ()) -> Recording:
     """Plan a clip; returns what was recorded."""
+    motion = {"reference": "clip", "clip": clip}
+    simulator = {"wrench_duration": 0.2}
+    plan = make_plan("humanoid", duration, motion, simulator, {"planner": "predictive"})
     with TemporaryDirectory() as folder:
-        command = [
-            sys.executable,
-            "-m",
-            "actuated_characters.cli",
-            "run",
-            "--output",
-            f"{folder}/run",
-        ]
-        command += ["--clip", clip, "--duration", f"{duration}", "--planner", "predictive"]
-        command += ["--set", "sim_node.wrench_duration:=0.2"]
-        command += [word for push in pushes for word in ("--push", push)]
-        subprocess.run(command, check=True, capture_output=True)
-        return read_recording(Path(folder) / "run")
+        directory = Path(folder) / "run"
+        prepare_directory(directory, overwrite=False)
+        run_in_process(plan, directory, pushes=[parse_push(text, plan) for text in texts])
+        return read_recording(directory)
 
 
 def draw_strip(clip: str, run: Recording) -> Picture:
