@@ -81,7 +81,8 @@ def start(executable: str, *parameters: str, namespace: str | None = None) -> Op
 
 def start_recorder() -> Node:
     """The recorder, which has no config, but the argument `directory`."""
-    directory = ParameterValue(LaunchConfiguration("directory"), value_type=str)  # also a number
+    # A text, if it looks like a number as well.
+    directory = ParameterValue(LaunchConfiguration("directory"), value_type=str)
     return Node(
         package=PACKAGE,
         executable="recorder",

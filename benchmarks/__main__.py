@@ -54,7 +54,8 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help="store the ratios as those to keep")
     options = parser.parse_args()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.update(middleware_settings(os.environ))  # as for its nodes, or it may not hear them
+    # Its nodes have them, too, or it may not hear them.
+    os.environ.update(middleware_settings(os.environ))
     console, ratios = Console(width=_WIDTH), []
     stored = read_ratios()  # before all that takes minutes: the file may be malformed
     with own_domain() as domain:

@@ -21,7 +21,7 @@ _PAIRS = 5  # pairs of runs with and without a recorder
 
 
 @dataclass(frozen=True)
-class Timing:
+class RunTiming:
     """What one run took."""
 
     ticks_per_s: float
@@ -39,7 +39,7 @@ def _real_time() -> RunPlan:
     return make_plan(CHARACTER, _REAL_TIME_DURATION, WALK, simulator, {"law": "zero"})
 
 
-def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
+def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> RunTiming:
     """Run simulator and controller as `run` does, with a recorder of everything or without."""
     with Nodes() as nodes, tempfile.TemporaryDirectory() as directory:
         recorder = None
@@ -54,15 +54,15 @@ def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
         nodes.wait_until(lambda: nodes.tick > plan.ticks)
         taken = time.monotonic() - began
         used = processor_time(recorder) - busy if recorder else 0.0
-        return Timing((nodes.tick - first) / taken, used / taken)
+        return RunTiming((nodes.tick - first) / taken, used / taken)
 
 
 def measure_recorder(console: Console) -> list[Ratio]:
     """Measure and print the table; how much slower the loop is, and the recorder's share."""
     console.print(f"recorder: {CHARACTER} at {RATE} Hz, {_PAIRS} pairs of runs, two ways ...")
     plan = walk(_DURATION)
-    pairs: dict[bool, list[tuple[Timing, Timing]]] = {True: [], False: []}
-    for _ in range(_PAIRS):  # in turns: the machine may be busier at times
+    pairs: dict[bool, list[tuple[RunTiming, RunTiming]]] = {True: [], False: []}
+    for _ in range(_PAIRS):  # they take turns: the machine may be busier at times
         for composed, timings in pairs.items():
             without = time_run(plan, recorded=False, composed=composed)
             timings.append((without, time_run(plan, recorded=True, composed=composed)))
@@ -87,11 +87,11 @@ def measure_recorder(console: Console) -> list[Ratio]:
     ]
 
 
-def _slow_downs(timings: list[tuple[Timing, Timing]]) -> list[float]:
+def _slow_downs(timings: list[tuple[RunTiming, RunTiming]]) -> list[float]:
     return [without.ticks_per_s / beside.ticks_per_s for without, beside in timings]
 
 
-def _ticks(timings: list[tuple[Timing, Timing]], which: int) -> str:
+def _ticks(timings: list[tuple[RunTiming, RunTiming]], which: int) -> str:
     return f"{_median([pair[which].ticks_per_s for pair in timings]):.0f}"
 
 

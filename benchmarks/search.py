@@ -17,14 +17,14 @@ from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import read_clip
 
 _STATES = 30  # states of a walk, each looked for once
-_LASTING = 0.5  # s, the default of `blend.duration`
+_BLEND_DURATION = 0.5  # s, the default of `blend.duration`
 
 
 def measure_search(console: Console) -> list[Ratio]:
     """Measure and print the table; the ratio of the median search to the yardstick."""
     console.print("search of the library: humanoid ...")
     humanoid = load_character("humanoid")
-    library = MotionLibrary(humanoid, [], _LASTING)
+    library = MotionLibrary(humanoid, [], _BLEND_DURATION)
     walk = ClipReference(humanoid.layout, read_clip(humanoid, "walk"))
     durations = []
     for number in range(_STATES):

@@ -31,7 +31,7 @@ Watching = Callable[[], AbstractContextManager[PageClient | None]]
 
 
 @dataclass(frozen=True)
-class Timing:
+class WatchTiming:
     """What was measured between two reports of the simulator."""
 
     ticks_per_s: float
@@ -68,7 +68,9 @@ def measure_watching(console: Console) -> list[Ratio]:
     return ratios
 
 
-def _measure(plan: RunPlan, *, composed: bool) -> Iterator[tuple[str, list[tuple[Timing, Timing]]]]:
+def _measure(
+    plan: RunPlan, *, composed: bool
+) -> Iterator[tuple[str, list[tuple[WatchTiming, WatchTiming]]]]:
     """Pairs of times, not watched and watched, for each kind of page."""
     with Nodes() as nodes:
         viewer = nodes.start(topics.VIEWER_NODE, {"port": _PORT})
@@ -98,7 +100,9 @@ def _browser(nodes: Nodes) -> Iterator[None]:
         yield None
 
 
-def _pairs(nodes: Nodes, viewer: Child, watching: Watching) -> list[tuple[Timing, Timing]]:
+def _pairs(
+    nodes: Nodes, viewer: Child, watching: Watching
+) -> list[tuple[WatchTiming, WatchTiming]]:
     pairs = []
     for _ in range(_PAIRS):
         timings = []
@@ -109,7 +113,7 @@ def _pairs(nodes: Nodes, viewer: Child, watching: Watching) -> list[tuple[Timing
     return pairs
 
 
-def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> Timing:
+def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> WatchTiming:
     """Measure from the next report to the one some reports later."""
 
     def count() -> tuple[float, float, float, int]:
@@ -122,9 +126,9 @@ def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> Timing:
     for _ in range(_REPORTS):
         last = count()
     taken, ticks, busy, pictures = (b - a for a, b in zip(first, last, strict=True))
-    return Timing(ticks / taken, busy / taken, pictures / taken)
+    return WatchTiming(ticks / taken, busy / taken, pictures / taken)
 
 
-def _medians(timings: list[Timing]) -> Timing:
+def _medians(timings: list[WatchTiming]) -> WatchTiming:
     rows = [(each.ticks_per_s, each.share, each.pictures_per_s) for each in timings]
-    return Timing(*np.median(rows, axis=0).tolist())
+    return WatchTiming(*np.median(rows, axis=0).tolist())

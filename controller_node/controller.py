@@ -95,7 +95,7 @@ class Controller:
         # Whether commanded velocities steer the reference.
         self.is_steered = isinstance(reference, SteeredReference)
         self._no_contacts = np.zeros((len(character.links), 6))
-        self.begin_episode(0)  # until a state says of which episode it is
+        self.begin_episode(0)  # the first state says of which episode it is
 
     def _enter_episode(self, episode_ns: int) -> None:
         """Begin the episode of a stamp, unless it has begun."""
@@ -272,6 +272,7 @@ class Controller:
 
     def _take(self, output: BehaviourOutput, stamp_ns: int) -> None:
         """Take a behaviour's phase and target from now on."""
+        # A phase or a target that goes on is the same object: a new one has begun in this tick.
         if self.mode is None or self.mode.phase is not output.phase:
             self.mode = ModeReport(output.phase, stamp_ns)
         if output.target is not self._tracked.target:

@@ -68,7 +68,7 @@ def _run_study(study: "Study", label: str, directory: Path, options: argparse.Na
         task = bar.task_ids[0]
 
         def report(run: str, share: float) -> None:
-            if run not in done and not bar.console.is_terminal:  # where no bar is drawn
+            if run not in done and not bar.console.is_terminal:  # no bar is drawn there
                 bar.console.print(f"{label}: run {len(done) + 1} of {study.runs}, {run}")
             done[run] = share
             total = max(float(study.runs), float(len(done)))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 _BY_BLENDER = "convert it to BVH, with Blender say (import it, then File > Export > Motion Capture)"
 _IMPORT = "'actuated_characters motion import'"
-_FOREIGN = {
+_FOREIGN_FORMATS = {
     ".fbx": ("an FBX scene", _BY_BLENDER),
     ".dae": ("a COLLADA scene", _BY_BLENDER),
     ".glb": ("a glTF scene", _BY_BLENDER),
@@ -56,9 +56,9 @@ def describe_foreign_motion(path: Path) -> str:
         (kind for mark, kind in _SIGNATURES.items() if beginning.startswith(mark)),
         path.suffix.lower(),
     )
-    if suffix not in _FOREIGN:
+    if suffix not in _FOREIGN_FORMATS:
         return ""
-    what, remedy = _FOREIGN[suffix]
+    what, remedy = _FOREIGN_FORMATS[suffix]
     return f"{what}; {remedy}"
 
 

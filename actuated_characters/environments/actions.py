@@ -106,7 +106,8 @@ class TargetActuation:
             lower[self._actuated], upper[self._actuated], dtype=np.float64
         )
         self._offset: FloatArray | None = None  # (n,); None: nothing is added, not even a zero
-        self._target: GeneralizedPosition | None = None  # in place of the reference's position
+        # Takes the place of the reference's position.
+        self._target: GeneralizedPosition | None = None
 
     def hold(self, action: FloatArray) -> None:
         """Hold offsets or positions (a,)."""

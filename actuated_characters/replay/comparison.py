@@ -68,7 +68,7 @@ class ReplayResult:
     difference: Difference | None  # the first one, None if all is identical or within tolerance
     states: int  # states of each character that were compared
     episodes: int
-    state_hashes: Mapping[str, str]  # of the replayed states, by `Recording.name`
+    state_hashes: Mapping[str, str]  # the replayed states' hashes by `Recording.name`
     largest: Mapping[str, float] = field(default_factory=dict)  # differences by unit
     remarks: Sequence[str] = ()  # what could not be compared, and why
 

@@ -30,7 +30,7 @@ class Ratio:
 
     figure: str
     value: float
-    how: str  # which cost over which
+    how: str  # says which cost is over which
 
 
 @dataclass(frozen=True)

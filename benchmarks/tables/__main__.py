@@ -25,11 +25,11 @@ from rich.progress import Progress  # noqa: E402
 from benchmarks.support.printed import make_table  # noqa: E402
 from benchmarks.tables import captures, machines, planned  # noqa: E402
 from benchmarks.tables.case import heavier  # noqa: E402
-from benchmarks.tables.many import Options, Result, Table, cell, results, rows  # noqa: E402
+from benchmarks.tables.many import Options, Result, RunTable, cell, results, rows  # noqa: E402
 from benchmarks.tables.push_map import draw  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of  # noqa: E402
 
-TABLES: Mapping[str, Table] = {**planned.TABLES, **machines.TABLES, **captures.TABLES}
+TABLES: Mapping[str, RunTable] = {**planned.TABLES, **machines.TABLES, **captures.TABLES}
 
 
 def main() -> int:

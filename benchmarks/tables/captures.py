@@ -7,7 +7,7 @@ import numpy as np
 
 from actuated_characters.metrics.error_measures import joint_errors
 from benchmarks.tables.case import Case, Fact
-from benchmarks.tables.many import Options, Table
+from benchmarks.tables.many import Options, RunTable
 from benchmarks.tables.planned import planner
 from benchmarks.tables.seen import Seen
 from character_motion.clips.importing import ImportedClip, import_bvh
@@ -65,8 +65,8 @@ def measure_capture(seen: Seen) -> Mapping[str, Fact]:
     }
 
 
-TABLES: Mapping[str, Table] = {
-    "captures": Table(
+TABLES: Mapping[str, RunTable] = {
+    "captures": RunTable(
         "clips of captures", [*MADE], capture_cases, measure_capture, takes_files=True
     )
 }

@@ -36,7 +36,7 @@ class Case:
     since: float = 0.0  # s, from which on it is measured
     until_fall: bool = True
     follows: bool = False
-    settings: Sequence[str] = ()  # as `--set` has them, before all others
+    settings: Sequence[str] = ()  # as `--set` has them; they take precedence
     character: str = "humanoid"
     world: str = ""  # the character that is simulated, where the controller takes it for another
     facts: Mapping[str, Fact] = field(default_factory=dict)  # known before the run

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from benchmarks.tables.case import Case, Fact
-from benchmarks.tables.many import Options, Table
+from benchmarks.tables.many import Options, RunTable
 from benchmarks.tables.planned import time_to_stop
 from benchmarks.tables.seen import Seen
 from controller_node.behaviours.state_machine.file import read_machine
@@ -16,7 +16,7 @@ from msgs_config.geometry import rotations
 
 WALKS = ("speeds", "headings", "pushes", "steps", "grid", "slalom", "bends")
 SPEEDS = (0.3, 0.6, 0.9, 1.2)  # m/s
-AHEAD, ASIDE = 120.0, 60.0  # N, of pushes
+AHEAD, ASIDE = 120.0, 60.0  # forces of pushes, N
 STEP, STEP_LENGTH = 0.03, 0.8  # m, of the ground up or down, and from one to the next
 TURN = 0.5  # rad/s while it turns to a heading
 GRID = ((0.0, 0.3, 0.6, 0.9, 1.2), (-0.5, -0.25, 0.0, 0.25, 0.5), (-0.3, 0.0, 0.3))
@@ -29,7 +29,7 @@ FLIGHT, STANDING, STILL, UPRIGHT = 0.25, 3.0, 0.1, 0.98
 """Of a jump that succeeds: s without contact, s from then to the end, m/s and cosine there."""
 RUN_SPEED, COMMANDED, AIRBORNE = 2.0, 2.1, 0.1
 """Of a run that succeeds: m/s covered where so much is commanded, share of time in the air."""
-RUN_SECONDS, NUDGE_PERIOD = 20.0, 4.0  # s, of the time that is measured, and of one nudge in it
+RUN_SECONDS, NUDGE_PERIOD = 20.0, 4.0  # s that are measured, and s in which one nudge comes
 
 
 def machine_case(row: str, seconds: float, machine: str, **more: object) -> Case:
@@ -241,8 +241,8 @@ def measure_run(seen: Seen) -> dict[str, Fact]:
     }
 
 
-TABLES: Mapping[str, Table] = {
-    "walk": Table("walks of a machine", WALKS, walk_cases, measure_walk),
-    "jump": Table("jumps of a machine", ("undisturbed", "nudged"), jump_cases, measure_jump),
-    "run": Table("runs of a machine", ("nudged", "stops"), run_cases, measure_run),
+TABLES: Mapping[str, RunTable] = {
+    "walk": RunTable("walks of a machine", WALKS, walk_cases, measure_walk),
+    "jump": RunTable("jumps of a machine", ("undisturbed", "nudged"), jump_cases, measure_jump),
+    "run": RunTable("runs of a machine", ("nudged", "stops"), run_cases, measure_run),
 }

@@ -20,11 +20,11 @@ Result: TypeAlias = tuple[Case, Mapping[str, Fact]]
 class Options:
     """What is asked of a table."""
 
-    runs: int | None = None  # of each row; None: as many as the pages tell of
+    runs: int | None = None  # runs of each row; None: as many as the pages tell of
     first_seed: int = 1
-    seconds: float | None = None  # of each run; None: as the pages tell of
+    seconds: float | None = None  # length of each run, s; None: that of the pages
     machine: str = ""
-    folder: Path = Path()  # for files of the runs
+    folder: Path = Path()  # takes the files of the runs
 
     def seeds(self, usual: int) -> range:
         """The seeds of a row."""
@@ -32,14 +32,14 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Table:
+class RunTable:
     """Cases by kind, and what is measured of each."""
 
     title: str
     kinds: Sequence[str]
     cases: Callable[[str, Options], Iterable[Case]]
     measure: Measure
-    takes_files: bool = False  # as kinds, too
+    takes_files: bool = False  # whether files may be kinds
 
 
 def attempt(case: Case, measure: Measure) -> Mapping[str, Fact]:

@@ -10,7 +10,7 @@ import numpy as np
 from actuated_characters.metrics.error_measures import joint_errors
 from actuated_characters.runs.planned.throws import plan_throws
 from benchmarks.tables.case import Case, Fact
-from benchmarks.tables.many import Options, Table
+from benchmarks.tables.many import Options, RunTable
 from benchmarks.tables.seen import Seen
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
@@ -22,7 +22,7 @@ BALL_LIFETIME = 0.6  # s, of which it flies 0.2
 MISSED = 0.2  # m that a walk is beside its clip where a ball misses it
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
 STOP = "2.5,0,0@0 0,0,0@5.5"
-_TIME = re.compile(r"(?:@|at=)([0-9.]+)")  # of a push or a throw
+_TIME = re.compile(r"(?:@|at=)([0-9.]+)")  # time of a push or a throw
 STANDS, OVER = 0.15, 0.25  # m/s, s: it stands if it is slower than this in the mean over that time
 
 
@@ -69,7 +69,7 @@ class PushKind:
     every: float = 2.0  # s
     lasts: float = 0.2  # s that each push lasts
     balls: bool = False  # balls at the chest; the clip's heading is forwards
-    stands: bool = False  # instead of walking
+    stands: bool = False  # it stands instead of walking
     seconds: float = 8.5
     behaviour: str = "tracking"
 
@@ -193,13 +193,17 @@ def time_to_stop(roots: FloatArray, rate: int) -> float:
     return float(moves[-1] + 1 + ticks / 2) / rate if len(moves) else 0.0
 
 
-TABLES: Mapping[str, Table] = {
-    "clips": Table(
+TABLES: Mapping[str, RunTable] = {
+    "clips": RunTable(
         "clips, planned",
         available_clips(load_character("humanoid")),
         clip_cases,
         measure_clip,
     ),
-    "pushes": Table("what the planner does not know of", [*PUSH_KINDS], push_cases, measure_push),
-    "courses": Table("commanded courses, planned", ["eight", "stop"], course_cases, measure_course),
+    "pushes": RunTable(
+        "what the planner does not know of", [*PUSH_KINDS], push_cases, measure_push
+    ),
+    "courses": RunTable(
+        "commanded courses, planned", ["eight", "stop"], course_cases, measure_course
+    ),
 }

@@ -11,7 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from benchmarks.tables.case import Case, Fact
 from msgs_config.arrays import BoolArray, FloatArray
 
-STEPS = 30  # of Newton's method
+STEPS = 30  # steps of Newton's method
 RIDGE = 0.01  # without it few walks leave the fit without a minimum
 
 

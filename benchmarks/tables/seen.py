@@ -38,7 +38,7 @@ class Seen:
     anchors: Sequence[Anchor]  # (t,) by which a planner's reference has given way
     fell_at: float | None  # s, the first time
     lost_at: float | None  # s
-    is_up: bool  # at the end, and tracking its reference or in a state of a machine
+    is_up: bool  # whether it ends upright, tracking its reference or in a machine's state
 
     @property
     def rate(self) -> int:

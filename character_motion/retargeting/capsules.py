@@ -75,7 +75,7 @@ def closest_points(first: FloatArray, second: FloatArray) -> tuple[FloatArray, F
     # Without what lies along the other line, the angle between nearly parallel ones is exact.
     across = way - _share(way, other_way) * other_way
     gap_across = between - _share(between, other_way) * other_way
-    s = np.clip(_share(-gap_across, across), 0.0, 1.0)  # on parallel lines any point will do
+    s = np.clip(_share(-gap_across, across), 0.0, 1.0)  # any point will do on parallel lines
     t = np.clip(_share(between + s * way, other_way), 0.0, 1.0)
     s = np.clip(_share(t * other_way - between, way), 0.0, 1.0)
     return start + s * way, other_start + t * other_way

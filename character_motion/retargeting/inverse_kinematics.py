@@ -21,17 +21,17 @@ from msgs_config.geometry import fixed_order, rotations
 _USUAL_FRAME = 1.0 / 60.0  # s: the residuals of a frame of this duration count once
 _DAMPING = 1e-2  # added to each block at least, for coordinates that no residual is about
 # Factors of the damping after a step that failed and one that did well, and its bound.
-_STIFFENED, _EASED, _MOST_DAMPING = 8.0, 4.0, 1e6
-_FIXED = 1e12  # added where frames are fixed
+_DAMPING_INCREASE, _DAMPING_DECREASE, _MOST_DAMPING = 8.0, 4.0, 1e6
+_FIXED_FRAME_DAMPING = 1e12  # added where frames are fixed
 _LARGEST_STEP = 0.4  # rad or m
 _LAST_STEP = 3e-4  # rad or m of the largest step, at which an iteration ends
 _ACTIVE_SETS = 5  # times that a step is solved while bounds come and go
 _WINDOW, _OVERLAP = 480, 60  # frames that are solved at once, and those solved once more
-_NEAR_DISTANCE = (
-    0.2  # m between two shapes at first, beyond which a solution does not bring them together
-)
-_LOWEST = 40  # points of the surface a frame that are kept over the ground, the lowest ones
-_NEAREST = 8  # pairs of shapes a frame that are kept apart, the nearest ones
+# Two shapes that are so far apart at first, m, are not brought together by a solution.
+_NEAR_DISTANCE = 0.2
+# So many points of the surface, the lowest ones of each frame, are kept over the ground.
+_GROUND_POINTS_A_FRAME = 40
+_PAIRS_A_FRAME = 8  # pairs of shapes a frame that are kept apart, the nearest ones
 
 Linear = tuple[FloatArray, FloatArray]
 """Jacobians (f, m, n) of m residuals in f frames, and what is missing (f, m)."""
@@ -116,9 +116,9 @@ class InverseKinematics:
             step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-12))
             then = self._linearised(self._moved(now.motion, step), goals, weights)
             if then.cost < now.cost:
-                now, damping = then, max(damping / _EASED, _DAMPING)
+                now, damping = then, max(damping / _DAMPING_DECREASE, _DAMPING)
             else:
-                damping *= _STIFFENED
+                damping *= _DAMPING_INCREASE
             if float(largest.max()) < _LAST_STEP or damping > _MOST_DAMPING:
                 break
         return now.motion
@@ -130,7 +130,7 @@ class InverseKinematics:
         quadratic, gradient = _normal_equations(*now.wanted)
         diagonal = np.arange(quadratic.shape[-1])
         quadratic[:, diagonal, diagonal] += damping
-        quadratic[:fixed, diagonal, diagonal] += _FIXED
+        quadratic[:fixed, diagonal, diagonal] += _FIXED_FRAME_DAMPING
         limit, missing = now.bounded
         active = missing > 0.0
         for _ in range(_ACTIVE_SETS):
@@ -238,7 +238,7 @@ class InverseKinematics:
         heights = origins[..., 2] + arms[..., 2] - goals.surface.radii
         missing = goals.clearance - heights
         rows = np.arange(len(missing))[:, np.newaxis]
-        lowest = np.argsort(-missing, axis=1, kind="stable")[:, :_LOWEST]
+        lowest = np.argsort(-missing, axis=1, kind="stable")[:, :_GROUND_POINTS_A_FRAME]
         rising = _point_jacobians(jacobians[rows, links[lowest]], arms[rows, lowest])[:, :, 2]
         return goals.ground_weight * rising, goals.ground_weight * missing[rows, lowest]
 
@@ -293,7 +293,7 @@ def _apart(
     """How the nearest pairs of shapes go from each other, and by how much they must."""
     near = capsules.nearest(origins, axes)
     missing = capsules.margins - near.distance
-    count = min(_NEAREST, missing.shape[1])
+    count = min(_PAIRS_A_FRAME, missing.shape[1])
     rows = np.arange(len(missing))[:, np.newaxis]
     pairs = np.argsort(-missing, axis=1, kind="stable")[:, :count]
     direction = near.direction[rows, pairs]

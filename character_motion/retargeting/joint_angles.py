@@ -9,7 +9,7 @@ from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import elementary, rotations
 
-_ITERATIONS, _DAMPING, _LARGEST = 30, 1e-3, 0.5  # the last one is in rad, of a step
+_ITERATIONS, _DAMPING, _MAX_STEP = 30, 1e-3, 0.5  # the last one is in rad, of a step
 
 
 def joint_angles(
@@ -91,7 +91,7 @@ def _shared(
         normal = np.matmul(axes, axes.swapaxes(-1, -2)) + _DAMPING * np.eye(len(row))
         gradient = np.matmul(axes, missing[..., np.newaxis])
         step = np.linalg.solve(normal, gradient)[..., 0]
-        angles = np.clip(angles + np.clip(step, -_LARGEST, _LARGEST), low, high)
+        angles = np.clip(angles + np.clip(step, -_MAX_STEP, _MAX_STEP), low, high)
     positions[:, entries] = angles
     return _turned_by(character, row, above, angles)[0]
 

@@ -60,13 +60,13 @@ class RetargetingSettings:
 class RetargetedMotion:
     """A captured motion, and the same of a character."""
 
-    source: CapturedBody  # in the character's size and world, z up, where its ankles would be
+    source: CapturedBody  # the capture in the character's size and world, z up
     conventions: Conventions
     scale: float  # the character's lengths over the file's, in the file's unit
     contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
     turns: SegmentTurns  # the turns that were to be shown
     motion: GeneralizedPosition  # (f, n), (f, k, 4)
-    remarks: tuple[str, ...] = ()  # on the capture, a sentence each
+    remarks: tuple[str, ...] = ()  # a sentence each on the capture
 
 
 def read_body(

@@ -22,7 +22,7 @@ def solve_smooth(
     """
     frames, size = gradients.shape
     rows = np.arange(frames - 2)
-    bands = np.zeros((3, frames + 1))  # of D' D: the diagonal, and those one and two beside it
+    bands = np.zeros((3, frames + 1))  # the diagonal of D' D, and those one and two beside it
     for offset, value in ((0, 1.0), (1, 4.0), (2, 1.0)):
         bands[0, rows + offset] += value
     for offset, value in ((0, -2.0), (1, -2.0)):
@@ -52,7 +52,7 @@ def _solve_pairs(
     whole[:, size + diagonal, size + diagonal] += band[0, odd, None] * weights
     whole[:, diagonal, size + diagonal] += band[1, even, None] * weights
     whole[:, size + diagonal, diagonal] += band[1, even, None] * weights
-    beside = np.zeros((pairs, 2 * size, 2 * size))  # from a pair to the next one
+    beside = np.zeros((pairs, 2 * size, 2 * size))  # blocks that join a pair to the next one
     beside[:, diagonal, diagonal] = band[2, even, None] * weights
     beside[:, size + diagonal, diagonal] = band[1, odd, None] * weights
     beside[:, size + diagonal, size + diagonal] = band[2, odd, None] * weights

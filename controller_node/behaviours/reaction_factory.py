@@ -15,7 +15,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.parameters import Values
 
-_LYING = 0.5  # the part of a get-up clip in which it may begin
+_LYING_PART = 0.5  # the part of a get-up clip in which it may begin
 
 
 @BEHAVIOURS.register("active_ragdoll", *REACTION_PARAMETERS)
@@ -44,7 +44,7 @@ def _make_kit(character: Character, values: Values) -> ReactionKit:
         library = MotionLibrary(character, settings.library, settings.blend_duration)
     if settings.by_clip:
         sides = [settings.face_up, settings.face_down]
-        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING)
+        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING_PART)
     kit = ReactionKit(
         character=character,
         settings=settings,

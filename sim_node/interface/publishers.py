@@ -23,7 +23,7 @@ from sim_node.sensors.readers import SensingSettings
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 
-class Publishers:
+class CharacterPublishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
@@ -191,7 +191,7 @@ class Publishers:
 
 def wait_for_subscribers(
     node: BusNode,
-    publishers: Sequence[Publishers],
+    publishers: Sequence[CharacterPublishers],
     wanted: int,
     stop: StopFlag,
 ) -> Turns:

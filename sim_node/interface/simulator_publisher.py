@@ -9,7 +9,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.runtime.throttle import Throttle
-from sim_node.interface.publishers import Publishers
+from sim_node.interface.publishers import CharacterPublishers
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import make_node_settings
 from sim_node.parameters import SimulatorParameters
@@ -27,7 +27,7 @@ class SimulatorPublisher:
         node: BusNode,
         simulation: Simulation,
         world: WorldInterface,
-        of_characters: Sequence[Publishers],
+        of_characters: Sequence[CharacterPublishers],
         samples: Sequence[DynamicsSample],
     ) -> None:
         """Offer the clock. `samples` are the dynamics that the engine has for each character."""

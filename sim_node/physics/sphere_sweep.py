@@ -12,7 +12,7 @@ from sim_node.physics.world import World, WorldSettings
 
 _TOUCHING_DISTANCE = 1e-6  # m: what is nearer counts as touching
 _MOST_RADII = 20_000.0  # radii of the ball that it may come from at most
-_LAST_STEPS = 1000  # at most, from nearer than a radius until the ball touches
+_LAST_STEPS = 1000  # most steps from nearer than a radius until the ball touches
 
 
 @dataclass(frozen=True)

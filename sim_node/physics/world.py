@@ -21,7 +21,7 @@ from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine saves its state to files only
 _RAYS = 10_000  # rays in one call; the engine takes up to 16,383
-_DEEPEST = 1000.0  # m: how far below a point a surface is looked for
+_MAX_DEPTH = 1000.0  # m: how far below a point a surface is looked for
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class WorldSettings:
 
     step_s: float = 1.0 / 240.0  # length of one engine step
     gravity: float = 9.81  # m/s^2, along -z
-    friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
-    link_friction: float = 0.5  # of every link
+    friction: float = 0.9  # the ground's; a contact's is the product of both surfaces'
+    link_friction: float = 0.5  # every link's
     solver_iterations: int = 10
     contact_breaking_threshold: float = 0.02  # the engine's own; see the parameter of `sim_node`
     ground: bool = True  # the plane z = 0
@@ -152,7 +152,7 @@ class World:
         heights = np.zeros(len(points))
         for first in range(0, len(points), _RAYS):
             rows = points[first : first + _RAYS]
-            ends = rows - (0.0, 0.0, _DEEPEST)
+            ends = rows - (0.0, 0.0, _MAX_DEPTH)
             hits = pybullet.rayTestBatch(rows.tolist(), ends.tolist(), physicsClientId=self._client)
             for row, (body, _, _, place, _) in enumerate(hits, start=first):
                 if body >= 0:

@@ -8,7 +8,7 @@ from controller_node.behaviours.state_machine.body import Foot, in_frame, in_wor
 from controller_node.behaviours.state_machine.description import (
     CENTRE,
     STANCE,
-    Placement,
+    FootPlacement,
     State,
 )
 from controller_node.behaviours.state_machine.leg import FootPose, Leg
@@ -18,7 +18,7 @@ from controller_node.behaviours.state_machine.stepping import (
     least_beside,
     nominal_centre,
 )
-from controller_node.behaviours.state_machine.support import Contact
+from controller_node.behaviours.state_machine.support import FootContact
 from controller_node.references.steering.velocity import within
 from msgs_config.geometry.scalars import (
     Vector,
@@ -37,7 +37,9 @@ to turn the velocity with the heading. Tried: with 0 a run drifts outward, with 
 _LEAST_SHARE = 0.03  # least share of the load on each of two feet
 
 
-def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) -> list[Contact]:
+def contacts_of(
+    state: State, at: Situation, time: float, legs: dict[str, Leg]
+) -> list[FootContact]:
     """The feet that carry in a state, and their centres of pressure; `time` s after it began."""
     standing = [at.stance if role == STANCE else at.swing for role in state.standing]
     if not standing:
@@ -49,7 +51,7 @@ def contacts_of(state: State, at: Situation, time: float, legs: dict[str, Leg]) 
         sole = at.local(at.foot(side).sole)
         inside = [sole[axis] + within(wanted[axis] - sole[axis], limits[axis]) for axis in (0, 1)]
         place = at.world((inside[0], inside[1], sole[2]))
-        return [Contact(side, legs[side], 1.0, place)]
+        return [FootContact(side, legs[side], 1.0, place)]
     return _on_both(state, at, limits, legs)
 
 
@@ -72,7 +74,7 @@ def _pressure_on_one(state: State, at: Situation, time: float) -> tuple[float, f
 
 def _on_both(
     state: State, at: Situation, limits: tuple[float, float], legs: dict[str, Leg]
-) -> list[Contact]:
+) -> list[FootContact]:
     """Both feet, with the load where the extrapolated centre of mass is led to a share of it."""
     wanted, other = state.pressure, at.other
     there = at.extrapolated
@@ -89,8 +91,8 @@ def _on_both(
     stance = at.world((rest[0], rest[1], 0.0))
     swing = at.world((other[0] + rest[0], other[1] + rest[1], other[2]))
     return [
-        Contact(at.stance, legs[at.stance], 1.0 - share, stance),
-        Contact(at.swing, legs[at.swing], share, swing),
+        FootContact(at.stance, legs[at.stance], 1.0 - share, stance),
+        FootContact(at.swing, legs[at.swing], share, swing),
     ]
 
 
@@ -116,7 +118,7 @@ def landing(state: State, at: Situation, time: float, pressure: Vector) -> tuple
     return reachable(law, x + law.ahead, y, at.mirror)
 
 
-def reachable(law: Placement, x: float, y: float, mirror: float) -> tuple[float, float]:
+def reachable(law: FootPlacement, x: float, y: float, mirror: float) -> tuple[float, float]:
     """The nearest place at which the feet neither cross nor straddle."""
     beside = min(max(mirror * y, least_beside(law, x)), law.most_width)
     return min(max(x, -law.most_behind), law.most_ahead), mirror * beside
@@ -150,7 +152,7 @@ class SwingFoot:
         turn = self._yaw(at, moved, max(state.step_time - time, 0.0) + 0.5 * state.step_time)
         return FootPose((place[0], place[1], low), about_z(turn))
 
-    def _way_around(self, at: Situation, law: Placement, goal: tuple[float, float]) -> float:
+    def _way_around(self, at: Situation, law: FootPlacement, goal: tuple[float, float]) -> float:
         """How far from the straight way it goes at its middle, m, to pass the stance leg."""
         x, y, _ = at.local(self.start)
         share = x / (x - goal[0]) if x * goal[0] < 0.0 else 0.0
@@ -177,7 +179,7 @@ class Origin:
     beside: float  # m, to the left: where the foot goes from here
 
 
-def origin_of(placement: Placement, at: Situation, leg: Leg) -> Origin:
+def origin_of(placement: FootPlacement, at: Situation, leg: Leg) -> Origin:
     """The origin of the foot of a leg."""
     body, heading = at.body, at.course.heading
     hip = leg.hip(body.root, body.root_xyzw)

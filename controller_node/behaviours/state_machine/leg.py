@@ -30,7 +30,7 @@ from msgs_config.geometry.scalars import (
 
 _STRAIGHT = 1e-3  # m, at most, of knee and ankle from the vertical through the hip at angle 0
 _BENT = 0.05  # rad, of the knee at least: a straight leg has no direction to bend
-_FOLDED = 2.4  # rad, of the knee at most
+_MAX_KNEE_ANGLE = 2.4  # rad, of the knee at most
 
 
 class LegAngles(NamedTuple):
@@ -63,7 +63,7 @@ class Leg:
     shin_length: float  # m
     knee_sign: float  # 1 or -1: sign of the knee's angle where the shin goes backwards
     upright: tuple[Quaternion, Quaternion, Quaternion]  # thigh, shin, foot, in world
-    fixed: tuple[Quaternion, Quaternion]  # of hip and ankle, child in parent, at angle 0
+    fixed: tuple[Quaternion, Quaternion]  # turns of hip and ankle in their parents at angle 0
     sole_in_foot: Vector  # m, the middle of the sole, in the foot's link frame
     half_length: float  # m, of the sole
     half_width: float  # m
@@ -95,7 +95,7 @@ class Leg:
         ankle = subtract(foot.sole, rotate(foot_xyzw, self.sole_in_foot))
         reach = subtract(ankle, hip)
         thigh, shin = self.thigh_length, self.shin_length
-        distance = min(max(norm(reach), self._distance(_FOLDED)), self._distance(_BENT))
+        distance = min(max(norm(reach), self._distance(_MAX_KNEE_ANGLE)), self._distance(_BENT))
         along = scale(1.0 / max(norm(reach), 1e-9), reach)
         left = subtract(facing, scale(dot(facing, along), along))
         left = scale(1.0 / max(norm(left), 1e-9), left)

@@ -3,10 +3,10 @@
 import math
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.description import Placement, State
+from controller_node.behaviours.state_machine.description import FootPlacement, State
 from controller_node.references.steering.reference import Course
 
-_BESIDE = 0.2  # m, a sole's length
+_SOLE_LENGTH = 0.2  # m, a sole's length
 
 
 def nominal_centre(
@@ -46,12 +46,12 @@ def step_width(state: State, course: Course) -> float:
     return width + 0.5 * abs(course.forward * course.turn) * time * time
 
 
-def least_beside(law: Placement, ahead: float) -> float:
+def least_beside(law: FootPlacement, ahead: float) -> float:
     """The least distance aside of soles one of which is so much ahead of the other one, m.
 
     A foot that lands well ahead of the other one, or behind it, does not meet it.
     """
-    return law.least_width * (1.0 - laws.smooth_step((abs(ahead) - _BESIDE) / _BESIDE))
+    return law.least_width * (1.0 - laws.smooth_step((abs(ahead) - _SOLE_LENGTH) / _SOLE_LENGTH))
 
 
 def sway_of_course(state: State, course: Course, rate: float, mirror: float, time: float) -> float:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-_BACKWARD, _SIDEWAYS = 0.6, 0.3  # m/s, at most
+_BACKWARD, _SIDEWAYS = 0.6, 0.3  # largest speeds, m/s
 
 
 @dataclass(frozen=True)

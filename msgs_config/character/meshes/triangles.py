@@ -22,7 +22,7 @@ from msgs_config.extras import require_extra
 from msgs_config.geometry import fixed_order
 
 _MAX_TRIANGLES = 2_000_000
-_MAX_GEOMETRIES = 10_000  # of a COLLADA file, whose nodes may repeat each other
+_MAX_GEOMETRIES = 10_000  # a COLLADA file's nodes may repeat each other
 _STL_HEADER_BYTES = 80
 _STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _VERTEX_OF_TEXT = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)

@@ -27,7 +27,7 @@ _MAX_NUMBER = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_MAX_NUMBER, 0.0
 MOMENTS = ("ixx", "iyy", "izz")
-NUMBERS = {  # by element and attribute: how many, and the least that they may be
+NUMBERS = {  # how many numbers, and how small at least, by element and attribute
     "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
     "axis": {"xyz": (3, _ANY)},
     "mass": {"value": (1, _POSITIVE)},

@@ -9,25 +9,25 @@ URDF_SUFFIXES = (".urdf", ".xacro", ".xml")
 """Of files that a URDF may be in, in lower case."""
 YAML_SUFFIXES = (".yaml", ".yml")
 
-_RIGHT = "a character is a .urdf or .xacro file, or a .yaml file that names one"
-_MESH = f"a mesh, which a URDF can name in <mesh>; {_RIGHT}"
-_MODEL = f"a model; {_RIGHT}"
-_USD = f"USD, a scene of Omniverse or Isaac Sim; {_RIGHT}: robots in USD come from one as a rule"
-_SDF = f"SDF, Gazebo's format of models and worlds; {_RIGHT}"
-_MJCF = f"MJCF, MuJoCo's format; {_RIGHT}"
-_DATA = f"data, and no robot; {_RIGHT}"
+_REMEDY = "a character is a .urdf or .xacro file, or a .yaml file that names one"
+_MESH = f"a mesh, which a URDF can name in <mesh>; {_REMEDY}"
+_MODEL = f"a model; {_REMEDY}"
+_USD = f"USD, a scene of Omniverse or Isaac Sim; {_REMEDY}: robots in USD come from one as a rule"
+_SDF = f"SDF, Gazebo's format of models and worlds; {_REMEDY}"
+_MJCF = f"MJCF, MuJoCo's format; {_REMEDY}"
+_DATA = f"data, and no robot; {_REMEDY}"
 _BY_SUFFIX = {
     ".sdf": _SDF,
     ".world": _SDF,
     ".mjcf": _MJCF,
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
-    ".srdf": f"SRDF, what MoveIt adds to a URDF; {_RIGHT}",
-    ".proto": f"PROTO, Webots' format; {_RIGHT}",
+    ".srdf": f"SRDF, what MoveIt adds to a URDF; {_REMEDY}",
+    ".proto": f"PROTO, Webots' format; {_REMEDY}",
     **dict.fromkeys((".stl", ".obj", ".dae", ".glb", ".gltf", ".ply", ".fbx"), _MESH),
     **dict.fromkeys((".step", ".stp", ".sldasm", ".blend"), _MODEL),
     **dict.fromkeys((".npz", ".npy", ".csv", ".json", ".pkl", ".pt"), _DATA),
-    **dict.fromkeys((".mcap", ".db3"), f"a recording; {_RIGHT}"),
-    ".bvh": f"captured motion: 'motion import' makes a clip of it; {_RIGHT}",
+    **dict.fromkeys((".mcap", ".db3"), f"a recording; {_REMEDY}"),
+    ".bvh": f"captured motion: 'motion import' makes a clip of it; {_REMEDY}",
 }
 _BY_ROOT = {
     "sdf": _SDF,
@@ -37,9 +37,9 @@ _BY_ROOT = {
     "mujoco": _MJCF,
     "mujocoinclude": _MJCF,
     "COLLADA": _MESH,
-    "package": f"a ROS package's description; {_RIGHT}",
-    "launch": f"a launch file; {_RIGHT}",
-    "html": f"a web page, not the file itself; {_RIGHT}",
+    "package": f"a ROS package's description; {_REMEDY}",
+    "launch": f"a launch file; {_REMEDY}",
+    "html": f"a web page, not the file itself; {_REMEDY}",
 }
 _XACRO_SPACE = "xacro"  # is in every address under which xacro's name space is declared
 
@@ -63,7 +63,7 @@ def check_root(path: Path, robot: ElementTree.Element) -> None:
         CharacterError: it is not so; says what the file is.
     """
     if robot.tag != "robot":
-        what = _BY_ROOT.get(robot.tag, f"XML whose root is <{robot.tag[:100]}>; {_RIGHT}")
+        what = _BY_ROOT.get(robot.tag, f"XML whose root is <{robot.tag[:100]}>; {_REMEDY}")
         raise CharacterError(f"{path} is {what}")
     found = _find_xacro(robot)
     if found:

@@ -16,7 +16,7 @@ MAX_NAME = 100
 VELOCITY = "velocity"
 """The kind of the limits that nothing keeps."""
 
-_QUIET = frozenset({"name", "version", "xmlns", "id", "type", "group"})
+_IGNORED_ATTRIBUTES = frozenset({"name", "version", "xmlns", "id", "type", "group"})
 """Attributes of any element that mean nothing to a simulation."""
 
 
@@ -44,13 +44,13 @@ def _known(attributes: str = "", repeated: str = "", **parts: _Known) -> _Known:
 
 _NUMBER = _known("value")
 _ORIGIN = _known("xyz rpy")
-_ROUND = _known("radius length")
+_RADIUS_AND_LENGTH = _known("radius length")
 _MATERIAL = _known("name", color=_known("rgba"))
 _GEOMETRY = _known(
     box=_known("size"),
     sphere=_known("radius"),
-    cylinder=_ROUND,
-    capsule=_ROUND,
+    cylinder=_RADIUS_AND_LENGTH,
+    capsule=_RADIUS_AND_LENGTH,
     mesh=_known("filename scale"),
     plane=_known("normal"),  # only a terrain may have it
 )
@@ -117,7 +117,7 @@ class _Collector:
     def read(self, element: ElementTree.Element, known: _Known, place: str) -> None:
         """Remove what does not count from an element; `place` is the link or joint round it."""
         for name in element.attrib:
-            if name not in known.attributes and name.partition(":")[0] not in _QUIET:
+            if name not in known.attributes and name.partition(":")[0] not in _IGNORED_ATTRIBUTES:
                 self.add(name, f"'{name[:MAX_NAME]}' of <{element.tag}>", place)
         counted = set[str]()
         for part in list(element):
