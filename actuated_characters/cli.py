@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     ):
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them
-    import_module("lecture.command").add_study(commands)
+    import_module("lecture.framework.command").add_study(commands)
     add_command(commands, _list, "list", "list the characters and their clips", "", [])
     parameters = add_command(
         commands,

@@ -9,7 +9,7 @@ from rich.console import Console
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table, show
-from lecture.catalogue import NAMES, load_study
+from lecture.framework.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
 from msgs_config.extras import require_extra
 
