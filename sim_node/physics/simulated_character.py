@@ -12,9 +12,9 @@ from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
 from sim_node.initial_state import check_length
+from sim_node.physics.balls.projectiles import Projectiles
 from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
-from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.short_links import speed_bounds
 from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench

@@ -14,9 +14,9 @@ from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
+from sim_node.physics.balls.projectiles import Projectiles
 from sim_node.physics.body import Body
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
-from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine saves its state to files only

@@ -9,7 +9,7 @@ import numpy as np
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.arrays import FloatArray
-from sim_node.physics.sphere_sweep import BallAndCharacter
+from sim_node.physics.balls.sphere_sweep import BallAndCharacter
 from sim_node.physics.world import World, WorldSettings
 from sim_node.simulation_factory import make_simulation_settings
 

@@ -18,8 +18,8 @@ from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from msgs_config.shared_parameters import PLANE
-from sim_node.physics.sphere_sweep import find_impact
-from sim_node.physics.throws import MOST_BALLS
+from sim_node.physics.balls.sphere_sweep import find_impact
+from sim_node.physics.balls.throws import MOST_BALLS
 
 SIDES: Mapping[str, float | None] = {
     "front": 0.0,
