@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order

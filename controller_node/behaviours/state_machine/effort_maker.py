@@ -13,7 +13,7 @@ from controller_node.behaviours.state_machine.description import (
     RootTarget,
     State,
 )
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from controller_node.behaviours.state_machine.pose import TargetPose
 from controller_node.behaviours.state_machine.situation import Situation
 from controller_node.behaviours.state_machine.support import FootContact, support_effort

@@ -16,15 +16,15 @@ from controller_node.behaviours.state_machine.description import (
     State,
 )
 from controller_node.behaviours.state_machine.effort_maker import EffortMaker, Hold
-from controller_node.behaviours.state_machine.footing import (
+from controller_node.behaviours.state_machine.laws import smooth_step
+from controller_node.behaviours.state_machine.legs.footing import (
     ReachingFoot,
     SwingFoot,
     contacts_of,
     landing,
     origin_of,
 )
-from controller_node.behaviours.state_machine.laws import smooth_step
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from controller_node.behaviours.state_machine.pose import PoseMaker, TargetPose
 from controller_node.behaviours.state_machine.situation import Situation, quantity, situation_of
 from controller_node.behaviours.state_machine.support import FootContact

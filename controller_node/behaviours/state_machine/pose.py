@@ -8,7 +8,7 @@ import numpy as np
 from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.body import BodyState, vector
 from controller_node.behaviours.state_machine.description import STANCE, JointTarget, Machine, State
-from controller_node.behaviours.state_machine.leg import FootPose, Leg
+from controller_node.behaviours.state_machine.legs.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType

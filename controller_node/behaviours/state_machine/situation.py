@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.body import BodyState, Foot, in_frame, in_world
 from controller_node.behaviours.state_machine.description import STEP, State
-from controller_node.behaviours.state_machine.leg import Leg
-from controller_node.behaviours.state_machine.stepping import sway_of_course
+from controller_node.behaviours.state_machine.legs.leg import Leg
+from controller_node.behaviours.state_machine.legs.stepping import sway_of_course
 from controller_node.references.steering.reference import Course
 from msgs_config.geometry.scalars import Vector, add, subtract
 

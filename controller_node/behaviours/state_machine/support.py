@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order

@@ -9,8 +9,8 @@ from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.description import CENTRE, HIP, FootPlacement
 from controller_node.behaviours.state_machine.factory import kit_of
 from controller_node.behaviours.state_machine.file import read_machine
-from controller_node.behaviours.state_machine.footing import ReachingFoot, origin_of
-from controller_node.behaviours.state_machine.leg import FootPose
+from controller_node.behaviours.state_machine.legs.footing import ReachingFoot, origin_of
+from controller_node.behaviours.state_machine.legs.leg import FootPose
 from controller_node.behaviours.state_machine.machine import MachineKit
 from controller_node.behaviours.state_machine.situation import Situation, situation_of
 from controller_node.references.steering.reference import Course

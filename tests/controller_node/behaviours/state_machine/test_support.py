@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controller_node.behaviours.state_machine.leg import make_leg
+from controller_node.behaviours.state_machine.legs.leg import make_leg
 from controller_node.behaviours.state_machine.support import (
     Bounds,
     FootContact,

@@ -11,13 +11,13 @@ from controller_node.behaviours.state_machine.description import (
     FootPlacement,
     State,
 )
-from controller_node.behaviours.state_machine.leg import FootPose, Leg
-from controller_node.behaviours.state_machine.situation import Situation
-from controller_node.behaviours.state_machine.stepping import (
+from controller_node.behaviours.state_machine.legs.leg import FootPose, Leg
+from controller_node.behaviours.state_machine.legs.stepping import (
     landing_offset,
     least_beside,
     nominal_centre,
 )
+from controller_node.behaviours.state_machine.situation import Situation
 from controller_node.behaviours.state_machine.support import FootContact
 from controller_node.references.steering.velocity import within
 from msgs_config.geometry.scalars import (
