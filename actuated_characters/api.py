@@ -25,7 +25,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
-from msgs_config.character.followers import check_undriven
+from msgs_config.character.joints.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState

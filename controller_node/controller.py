@@ -40,7 +40,7 @@ from controller_node.strength import Strengths, StrengthSchedule
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MotionError
 from msgs_config.messages.clock import TickClock

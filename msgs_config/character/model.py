@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.coupling import Coupling
+from msgs_config.character.joints.coupling import Coupling
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
 from msgs_config.character.urdf.mimic import Mimic

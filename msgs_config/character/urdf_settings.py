@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from msgs_config import files
-from msgs_config.character.joint_bounds import write_bounds
+from msgs_config.character.joints.joint_bounds import write_bounds
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
 from msgs_config.character.urdf.frames import has_massless_base

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
