@@ -18,9 +18,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.joints.coupling import Coupling
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
+from msgs_config.character.urdf.file_formats.vocabulary import LeftOut
 from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.character.urdf.reading import ReadUrdf, read_robot
-from msgs_config.character.urdf.vocabulary import LeftOut
 from msgs_config.errors import LayoutError
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW

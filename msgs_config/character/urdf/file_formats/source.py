@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from msgs_config import files
-from msgs_config.character.urdf.formats import check_suffix
+from msgs_config.character.urdf.file_formats.formats import check_suffix
 from msgs_config.errors import CharacterError
 from msgs_config.extras import hint
 
 XACRO = ".xacro"
-_EXPANDED_BY = "msgs_config.character.urdf.xacro_process"
+_EXPANDED_BY = "msgs_config.character.urdf.file_formats.xacro_process"
 _LONGEST_S = 60.0  # wall time of one expansion
 
 
