@@ -17,7 +17,7 @@ from character_motion.clips.quality import (
     link_poses,
     measure_quality,
 )
-from character_motion.retargeting.inverse_kinematics import Progress
+from character_motion.retargeting.optimisation.inverse_kinematics import Progress
 from character_motion.retargeting.retargeting import (
     RetargetedMotion,
     RetargetingSettings,

@@ -25,8 +25,8 @@ from character_motion.retargeting.conventions import (
     rest_name,
     to_upright,
 )
-from character_motion.retargeting.goals import first_guess, free_goals
-from character_motion.retargeting.inverse_kinematics import InverseKinematics, Progress
+from character_motion.retargeting.optimisation.goals import first_guess, free_goals
+from character_motion.retargeting.optimisation.inverse_kinematics import InverseKinematics, Progress
 from character_motion.retargeting.own_skeleton import own_motion
 from character_motion.retargeting.plausibility import (
     describe_floating,

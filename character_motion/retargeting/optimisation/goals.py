@@ -3,8 +3,8 @@
 import numpy as np
 
 from character_motion.retargeting.captured_body import CapturedBody
-from character_motion.retargeting.inverse_kinematics import Goals
-from character_motion.retargeting.joint_angles import joint_angles
+from character_motion.retargeting.optimisation.inverse_kinematics import Goals
+from character_motion.retargeting.optimisation.joint_angles import joint_angles
 from character_motion.retargeting.segments import SegmentTurns
 from character_motion.retargeting.skeleton_map import SIDES
 from character_motion.retargeting.target_body import TargetBody

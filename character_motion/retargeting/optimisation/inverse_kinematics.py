@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from character_motion.retargeting.capsules import Capsules
-from character_motion.retargeting.smooth_least_squares import solve_smooth
+from character_motion.retargeting.optimisation.capsules import Capsules
+from character_motion.retargeting.optimisation.smooth_least_squares import solve_smooth
 from character_motion.retargeting.target_body import SurfacePoints, TargetBody
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import DynamicsModel
