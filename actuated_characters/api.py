@@ -132,7 +132,7 @@ class Controller:
         Raises:
             ActuatedCharactersError: the message is no state of the character.
         """
-        from msgs_config.messages.ros_state import effort_message, read_state
+        from msgs_config.bus.ros_state import effort_message, read_state
 
         layout = self.character.layout
         effort = self.compute_effort(read_state(layout, message))
