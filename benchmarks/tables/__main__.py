@@ -29,6 +29,7 @@ from benchmarks.tables.many import Options, Result, RunTable, cell, results, row
 from benchmarks.tables.push_map import draw  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of  # noqa: E402
 
+_WIDTH = 140  # characters; enough for every table
 TABLES: Mapping[str, RunTable] = {**planned.TABLES, **machines.TABLES, **captures.TABLES}
 
 
@@ -70,14 +71,13 @@ def main() -> int:
 
 def _runs(options: argparse.Namespace, folder: Path) -> list[Result]:
     """What becomes of all cases that are asked for; prints each, and the table."""
-    table, console = TABLES[options.table], Console()
+    table, console = TABLES[options.table], Console(width=_WIDTH)
     chosen = options.kinds or [kind for kind in table.kinds if kind != "any"]
     for kind in chosen:
         if kind not in table.kinds and not table.takes_files:
             raise ConfigurationError(one_of("kind", kind, list(table.kinds)))
-    asked = Options(
-        options.runs, options.first_seed, options.seconds, options.machine, folder
-    )  # fmt: skip
+    seconds, machine = options.seconds, options.machine
+    asked = Options(options.runs, options.first_seed, seconds, machine, folder)
     settings = tuple(options.set)
     cases = [
         replace(case, settings=settings) for kind in chosen for case in table.cases(kind, asked)
@@ -91,7 +91,8 @@ def _runs(options: argparse.Namespace, folder: Path) -> list[Result]:
         bar = progress.add_task("runs", total=len(cases))
         for case, facts in results(cases, table.measure, options.processes):
             done.append((case, facts))
-            words = ", ".join(f"{name}: {cell([fact])}" for name, fact in facts.items())
+            known = {name: fact for name, fact in facts.items() if fact is not None}
+            words = ", ".join(f"{name}: {cell([fact])}" for name, fact in known.items())
             progress.print(f"{case.row}: {words}", highlight=False)
             progress.advance(bar)
     console.print(make_table(table.title, *rows(done)))
