@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from character_motion.retargeting.contacts import Contact, mask, spans
-from character_motion.retargeting.optimisation.goals import MARGIN, link_motion
-from character_motion.retargeting.optimisation.inverse_kinematics import Goals
+from character_motion.retargeting.optimisation.goals import MARGIN, Goals, link_motion
 from character_motion.retargeting.skeleton_map import SIDES
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import BoolArray, FloatArray, IntArray

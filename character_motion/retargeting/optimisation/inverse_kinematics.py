@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from character_motion.retargeting.optimisation.capsules import Capsules
+from character_motion.retargeting.optimisation.goals import Goals
 from character_motion.retargeting.optimisation.smooth_least_squares import solve_smooth
-from character_motion.retargeting.target_body import SurfacePoints, TargetBody
+from character_motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition
@@ -38,37 +39,6 @@ Linear = tuple[FloatArray, FloatArray]
 
 Progress = Callable[[int, int], None]
 """Is told how many frames are done, and of how many."""
-
-
-@dataclass(frozen=True)
-class Goals:
-    """What the links should do in f frames; weights are those of residuals."""
-
-    links: IntArray  # (k,) whose turns are given
-    turns_xyzw: FloatArray  # (f, k, 4), world
-    turn_weights: FloatArray  # (f, k, 3, 3) 1/rad, of rotation vectors in world axes
-    point_links: IntArray  # (p,) links that the points move with
-    point_offsets: FloatArray  # (p, 3) m, in the link frame
-    places: FloatArray  # (f, p, 3) m, where the points should be
-    place_weights: FloatArray  # (f, p, 3) 1/m
-    surface: SurfacePoints
-    clearance: FloatArray  # (f, s) m, of each ball of the surface over the ground
-    ground_weight: float  # 1/m below that clearance
-    capsules: Capsules
-    overlap_weight: float  # 1/m nearer to each other than their margins
-    limit_weight: float  # 1/rad beyond a limit
-    acceleration: FloatArray  # (n,) m/s^2 or rad/s^2 that count as much as a residual of one
-
-    def part(self, frames: slice) -> "Goals":
-        """The goals of some frames."""
-        return replace(
-            self,
-            turns_xyzw=self.turns_xyzw[frames],
-            turn_weights=self.turn_weights[frames],
-            places=self.places[frames],
-            place_weights=self.place_weights[frames],
-            clearance=self.clearance[frames],
-        )
 
 
 class InverseKinematics:
