@@ -16,7 +16,7 @@ from actuated_characters.given_arrays import (
     is_same_first,
     real_array,
 )
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import run_in_process

@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics import error_measures
 from actuated_characters.metrics.error_measures import different_bits
-from actuated_characters.metrics.run_metrics import hash_of_states
+from actuated_characters.metrics.state_hash import hash_of_states
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock

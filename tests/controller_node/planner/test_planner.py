@@ -16,7 +16,7 @@ import pytest
 
 from actuated_characters.bags.plans import decode_plan
 from actuated_characters.bags.recording import Recording, read_recording
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.planning import foresight, plan_chart
 from actuated_characters.report.sections import CharacterReport
