@@ -45,24 +45,15 @@ def _quality(made: ImportedClip) -> dict[str, Fact]:
     return {
         "up, unit, rest": f"{conventions.up}, {conventions.unit}, {conventions.rest}",
         "in ground, mm": 1e3 * max(quality.feet_in_ground_m, 0.0),
-        "skating; 95 % below, cm/s": "; ".join(
-            "-" if v is None else f"{100 * v:.2f}" for v in skating
-        ),
+        "skating; 95 % below, cm/s": "; ".join(skating),
         "worst joint, rad": f"{made.worst_joint} {made.worst_mean_rad:.2f}",
     }
 
 
 def measure_capture(seen: Seen) -> Mapping[str, Fact]:
-    """What is known of the clip, and how well it is tracked."""
+    """How well a clip is tracked."""
     joints = joint_errors(seen.plan.character.layout, seen.position, seen.desired)
-    known = seen.case.facts or dict.fromkeys(
-        ("up, unit, rest", "in ground, mm", "skating; 95 % below, cm/s", "worst joint, rad")
-    )
-    return {
-        **known,
-        "joints, rad": float(np.mean(joints)),
-        "to the end": seen.lost_at is None,
-    }
+    return {"joints, rad": float(np.mean(joints)), "to the end": seen.lost_at is None}
 
 
 TABLES: Mapping[str, RunTable] = {

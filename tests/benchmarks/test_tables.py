@@ -10,6 +10,7 @@ import pytest
 from actuated_characters.runs.planned.throws import plan_throws
 from actuated_characters.runs.planned.wrenches import parse_push
 from benchmarks.tables import __main__ as command
+from benchmarks.tables.captures import capture_cases
 from benchmarks.tables.case import Case, heavier
 from benchmarks.tables.machines import (
     FLIGHT,
@@ -194,6 +195,16 @@ def test_a_root_has_stopped_when_it_is_slow_for_good() -> None:
     assert time_to_stop(roots, RATE) == pytest.approx(1.88, abs=0.02)
     assert time_to_stop(roots[:RATE], RATE) == math.inf
     assert time_to_stop(np.zeros((RATE, 2)), RATE) == 0.0
+
+
+@pytest.mark.slow
+def test_a_capture_is_tracked_with_assistance_and_planned(tmp_path: Path) -> None:
+    assisted, alone = capture_cases("cmu_walk", Options(folder=tmp_path))
+
+    assert assisted.facts["up, unit, rest"] == "y, ?, T"
+    assert str(assisted.facts["worst joint, rad"]).startswith("right_ankle 0.0")
+    planners = [each.plan().controller.text("planner") for each in (assisted, alone)]
+    assert planners == ["none", "predictive"]
 
 
 # Machines
