@@ -67,7 +67,7 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
-        # `planner: predictive` and `reconstruct`: numba compiles their rollouts (210 MB, BSD-2).
+        # `planner: predictive`, `motion reconstruct`: numba compiles rollouts (210 MB, BSD-2).
         "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
         # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
         "gymnasium": ["gymnasium>=1.0,<2"],

@@ -33,8 +33,9 @@ from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import as_values
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.physics import simulation
+from sim_node.physics.settings import SimulationSettings
 from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
@@ -219,7 +220,7 @@ class Simulation:
         return self._simulation.characters[0].state
 
     @property
-    def settings(self) -> simulation.SimulationSettings:
+    def settings(self) -> SimulationSettings:
         """What it depends on besides the character, where that begins, and the efforts."""
         return self._simulation.settings
 
@@ -286,7 +287,7 @@ class Simulation:
             np.concatenate(wrench)[np.newaxis],
             np.zeros((0, 3)),
             first_tick=self._simulation.tick,
-            ticks=make_node_settings(self._values).push_ticks,
+            ticks=NodeSettings.of(self._values).push_ticks,
         )
 
     def step(self, effort: FloatArray | Sequence[float]) -> StampedState:
@@ -335,7 +336,7 @@ class Simulation:
         return self.state
 
     @property
-    def _kind(self) -> tuple[tuple[str, ...], simulation.SimulationSettings]:
+    def _kind(self) -> tuple[tuple[str, ...], SimulationSettings]:
         """What another simulation's snapshot must have in common with this one."""
         return (self.character.file.name, *self.character.layout.dof_names), self.settings
 

@@ -37,7 +37,7 @@ def measure_lockstep(console: Console) -> list[Ratio]:
 
 def _measure(plan: RunPlan, table: Table) -> list[Ratio]:
     """Add the rows of one character; the ratios of a tick over topics to what it is made of."""
-    name, rate = plan.character.name, plan.simulator.integer("rate")
+    name, rate = plan.character.name, plan.simulation.rate_hz
     layout = plan.character.layout
     with timed(World, "step") as steps:
         in_process(plan)

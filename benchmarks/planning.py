@@ -81,7 +81,7 @@ class _World:
         self._plan = plan
         self._control = make_controller_settings(character, plan.controller)
         self._model = ContactModel(
-            character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.friction
+            character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.parameters.friction
         )
         self._residual_model = ResidualModel(character, self._model, settings)
         self._body = self._model.body(self._control.gains)

@@ -22,7 +22,7 @@ def measure_reconstruction(console: Console) -> list[Ratio]:
     console.print("reconstruction: humanoid, walk ...")
     counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
     times = [_window_time(count) for count in counts]
-    title = f"reconstruct --clip walk: a first window of 0.1 s of {_WORLDS} worlds, 240 Hz"
+    title = f"motion reconstruct --clip walk: a first window of 0.1 s of {_WORLDS} worlds, 240 Hz"
     table = make_table(title, ("processes", "wall time, s", "parallel efficiency"))
     for count, seconds in zip(counts, times, strict=True):
         table.add_row(str(count), f"{seconds:.1f}", f"{times[0] / (count * seconds):.2f}")

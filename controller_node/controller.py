@@ -97,6 +97,16 @@ class Controller:
         self._no_contacts = np.zeros((len(character.links), 6))
         self.begin_episode(0)  # the first state says of which episode it is
 
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """What it is made of, and does not change."""
+        return self._character, self._own_reference, self._choice, self._model
+
+    @property
+    def episode_ns(self) -> int:
+        """Stamp of the first state of the episode."""
+        return self._episode_ns
+
     def _enter_episode(self, episode_ns: int) -> None:
         """Begin the episode of a stamp, unless it has begun."""
         if episode_ns != self._episode_ns:

@@ -37,6 +37,10 @@ class TrackedReference:
         self._first_tick = clock.first_tick_from(episode_ns)
         self._known_from, self._known = 0, list[TimedState]()  # a tick, the states from there on
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the states that are known: they are sampled again."""
+        return vars(self) | {"_known": []}
+
     def tick(self, stamp_ns: int) -> int:
         """Ticks from the episode's first state to the first tick from a stamp on."""
         return self._clock.first_tick_from(stamp_ns) - self._first_tick

@@ -189,7 +189,7 @@ class BagWriter:
     def flush(self) -> None:
         """Hand all that was written to the operating system.
 
-        Flushed data outlives this process, however that ends: `actuated_characters recover` makes
+        Flushed data outlives this process, however that ends: `info BAG --recover` makes
         a recording of it. Without it a killed recorder loses up to the last MiB.
 
         Raises:

@@ -10,7 +10,7 @@ from controller_node.planner.settings import PREDICTIVE, RECORDED
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
-from sim_node.world_parameters import STEADY_CONTACTS
+from sim_node.physics.settings import STEADY_CONTACTS
 
 _PLANNING = {
     "planner": PREDICTIVE,

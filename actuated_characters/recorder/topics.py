@@ -4,12 +4,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from actuated_characters.recorder.parameters import RecorderSettings
 from msgs_config.bus.node import BusNode
 from msgs_config.character.sensors import SensorType
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.topic import Kept, Topic
-from msgs_config.parameters import Values
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
 _RECORDED_TOPICS = [
@@ -32,17 +32,16 @@ class RecordedTopic:
     character: str | None  # None if the topic is of all characters, or of none
 
 
-def wanted_topics(node: BusNode, values: Values) -> list[RecordedTopic]:
-    """The topics that the values of `recorder`'s parameters say, in the order to subscribe.
+def wanted_topics(node: BusNode, settings: RecorderSettings) -> list[RecordedTopic]:
+    """The topics that the recorder's settings say, in the order to subscribe.
 
     Raises:
         ConfigurationError: a name is wrong.
     """
-    has_bag = values.flag("write_bag")
-    characters = values.texts("characters") or ("",)
-    found = contract_topics(node, characters, values.texts("exclude"), measured_only=not has_bag)
+    has_bag, names = settings.write_bag, settings.names
+    found = contract_topics(node, names, settings.exclude, measured_only=not has_bag)
     # The sensors come first: the simulator begins when its states have all their subscribers.
-    return (sensor_topics(node, values.texts("sensors")) if has_bag else []) + found
+    return (sensor_topics(node, settings.sensors) if has_bag else []) + found
 
 
 def contract_topics(

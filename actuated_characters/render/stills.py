@@ -27,7 +27,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.nearest_rows import nearest_rows
 from msgs_config.whole_files import write_whole
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 
 LONGEST_ARROW = 0.4  # share of the extent of the characters
 

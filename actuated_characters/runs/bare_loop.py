@@ -36,7 +36,7 @@ def ticks_in_process(
     """
     controller = controller or make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
-    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
+    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulation.rate_hz)
     balls = ThrowQueue()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))

@@ -12,7 +12,7 @@ from actuated_characters.viewer.controls.panel import ControlPanel, Subject
 from actuated_characters.viewer.controls.shown_parameters import ShownParameter, shown_parameters
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.parameters import PARAMETERS
+from actuated_characters.viewer.parameters import PARAMETERS, ViewerSettings
 from actuated_characters.viewer.simulators import WatchedNamespace, WatchedSimulators
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
@@ -49,11 +49,12 @@ class ViewerNode(Node):
         super().__init__(topics.VIEWER_NODE, **options)
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
-        self._period = 1.0 / values.number("fps")
+        settings = ViewerSettings.of(values)
+        self._period = 1.0 / settings.fps
         self._once_logger = OnceLogger(self.get_logger())
-        host = values.text("host")
+        host = settings.host
         self._rejections = Rejections()
-        listening = open_socket(host, values.integer("port") or None)
+        listening = open_socket(host, settings.port or None)
         self._server = start_server(listening, RequestCheck(host), self._rejections.note)
         self._scene = BrowserScene(self._server)
         self._actions = ActionQueue()

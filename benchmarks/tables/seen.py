@@ -43,7 +43,7 @@ class Seen:
     @property
     def rate(self) -> int:
         """Ticks a second."""
-        return self.plan.simulator.integer("rate")
+        return self.plan.simulation.rate_hz
 
     @property
     def lasted(self) -> float:
@@ -85,7 +85,7 @@ def see(case: Case) -> Seen:
     controller = make_controller(own.character, own.reference, own.controller)
     links = [link.name for link in plan.character.links]
     feet = [links.index(foot) for foot in FEET if foot in links]
-    rate, loads = plan.simulator.integer("rate"), list[FloatArray]()
+    rate, loads = plan.simulation.rate_hz, list[FloatArray]()
     terrain = make_simulation_settings(plan.simulator).world.terrain
     fall = FallWatch(PostureReader(plan.character, terrain), rate)
     centre_at = DynamicsModel(plan.character).centre_of_mass_at

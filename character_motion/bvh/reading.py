@@ -16,8 +16,8 @@ from character_motion.bvh.hierarchy import (
 from character_motion.bvh.skeleton import BvhMotion
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClipError
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.files import read_text
-from msgs_config.motion_formats import describe_foreign_motion
 
 MAX_BYTES = 64 * 1024 * 1024
 """Of a file: ten minutes of a body with fingers at 120 Hz."""
@@ -59,11 +59,7 @@ def read_bvh(path: Path) -> BvhMotion:
 
 def _text(path: Path) -> str:
     """The text of a file, in UTF-8 or in UTF-16 with its mark, or else byte by byte."""
-    foreign = describe_foreign_motion(path)
-    if foreign:
-        raise ClipError(f"{path}: not a BVH file but {foreign}")
-    if path.suffix.lower() == ".json":
-        raise ClipError(f"{path}: not a BVH file; a clip needs no import, 'run --clip' plays it")
+    refuse_other_kind(path, "a BVH file", (".bvh",), ClipError)
     try:
         return read_text(path, ClipError, MAX_BYTES).removeprefix("\ufeff")
     except ClipError as error:

@@ -1,4 +1,4 @@
-"""BVH files of a character's own skeleton, such as `motion export` writes: taken as they are."""
+"""BVH files of a character's own skeleton, such as `export` writes: taken as they are."""
 
 import numpy as np
 

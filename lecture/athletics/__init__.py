@@ -6,7 +6,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.recording_metrics import has_fallen
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import mode_events
 from lecture.athletics.drawing import (
     draw_courses,
     draw_jump,
@@ -108,7 +108,7 @@ def _row(name: str, run_: Recording, wanted: CourseSeries | None) -> dict[str, o
         "speed error (m/s)": speed,
         "heading error (rad)": heading,
         "longest flight (s)": longest_flight(run_)[1],
-        "states": len({span.facts.get("state") for span in mode_spans(run_)} - {None}),
+        "states": len({span.facts.get("state") for span in mode_events(run_)} - {None}),
     }
 
 

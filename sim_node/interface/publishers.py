@@ -17,9 +17,8 @@ from msgs_config.messages.wrenches import SelectionEncoder, WrenchArrays, encode
 from msgs_config.parameters import Values
 from sim_node.interface.display import DisplayPublishers
 from sim_node.interface.sensors import SensorPublishers
-from sim_node.node_settings import NodeSettings
+from sim_node.node_settings import NodeSettings, SensingSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
-from sim_node.sensors.readers import SensingSettings
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 

@@ -9,7 +9,8 @@ from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.body import Body
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 
 INSTANT = 1e-7
 """An engine step, s, so short that a difference quotient over it is a derivative."""

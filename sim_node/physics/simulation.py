@@ -9,25 +9,14 @@ from msgs_config.errors import ClosedError, SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import (
     CharacterSetup,
     CharacterSnapshot,
     SimulatedCharacter,
 )
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
-
-
-@dataclass(frozen=True)
-class SimulationSettings:
-    """All that a simulation depends on beside its setups, the efforts, pushes and throws."""
-
-    rate_hz: int
-    substeps: int
-    speed_limit: float  # rad/s or m/s
-    command_delay_ticks: int
-    ball_ticks: int  # after which a ball is taken out of the way; 0: never
-    world: WorldSettings
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ the difference between its velocities in the last two states, over the tick.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import scalars
 from msgs_config.messages.state import StampedState
+from sim_node.node_settings import SensingSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.sensors.link_motion import AT_REST, FrameMotion, LinkKinematics
 from sim_node.sensors.noise import NoiseSource
@@ -23,15 +23,6 @@ _ORIENTATION, _ANGULAR_VELOCITY, _ACCELERATION = slice(0, 4), slice(13, 16), sli
 _COVARIANCES = {"orientation": 4, "angular_velocity": 16, "linear_acceleration": 28}
 _DIAGONAL = 4  # entries of a covariance from one variance to the next
 _NOT_MEASURED = -1.0  # first entry of a covariance: the quantity before it is not measured
-
-
-@dataclass(frozen=True)
-class SensingSettings:
-    """What readings depend on beside states, contacts and the sensor itself."""
-
-    tick_s: float
-    gravity: float  # m/s^2, along -z
-    seed: int  # the noise's
 
 
 class SensorReader:

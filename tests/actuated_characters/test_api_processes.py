@@ -256,7 +256,7 @@ os.execv(sys.executable, command)
 
 @pytest.mark.parametrize("closed", ["1", "2", "012"])
 def test_commands_run_where_there_is_no_output(closed: str, tmp_path: Path) -> None:
-    assert run_program(COMMAND, closed, "list").returncode == 0
+    assert run_program(COMMAND, closed, "run").returncode == 0
     assert run_program(COMMAND, closed, "info", str(tmp_path / "nothing")).returncode == 1
     options = ("--character", "pendulum", "--duration", "0.1", "--in-process")
     output = tmp_path / "run"

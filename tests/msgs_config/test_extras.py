@@ -22,7 +22,7 @@ NEEDS = [  # package, extra, arguments
     ("viser", "view", ("view", "run")),
     ("numba", "plan", (*WALK, "--planner", "predictive")),
     ("numba", "plan", (*WALK, "--planner", "predictive", "--in-process")),
-    ("numba", "plan", ("reconstruct", "--clip", "walk", "--output", "walk.json")),
+    ("numba", "plan", ("motion", "reconstruct", "--clip", "walk", "--output", "walk.json")),
     ("numba", "plan", ("study", "athletics", "--output", "results")),
     ("numba", "plan", ("study", "all", "--output", "results")),
     ("av", "video", ("render", "run", "--output", "film.mp4")),

@@ -1,6 +1,6 @@
 """The `metadata.yaml` of a rosbag2 directory: read of any version of rosbag2, and written."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -32,6 +32,7 @@ class BagMetadata(NamedTuple):
     files: tuple[Path, ...]  # the files in the order of writing
     topics: tuple[str, ...]
     compression_mode: str  # FILE, MESSAGE or empty
+    content: Mapping[str, Any]  # all of it
 
 
 def read_metadata(bag: Path) -> BagMetadata:
@@ -101,20 +102,20 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
             problem = one_of(what, value, [choice for choice in choices if choice])
             raise RecordingError(f"cannot read recording {bag}: {problem}")
     present = tuple(bag / PurePath(path).name for path in paths)  # old paths include the bag's name
-    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
+    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode, content)
 
 
-def storage_of(paths: Collection[str]) -> str:
+def storage_of(paths: Iterable[str]) -> str:
     """The storage of a bag's files by the suffix of the first one; empty if that says none."""
     suffixes = {suffix for path in list(paths)[:1] for suffix in PurePath(path).suffixes}
     return next((name for name, suffix in SUFFIXES.items() if suffix in suffixes), "")
 
 
 def recover_hint(bag: Path, does: str) -> str:
-    """The end of an error about a bag: what the command `recover` does, if it can do anything."""
+    """The end of an error about a bag: what `info --recover` does, if it can do anything."""
     run = bag.parent if bag.name == BAG else bag
     can = bag.is_dir() and any(file.suffix == SUFFIXES[MCAP] for file in bag.iterdir())
-    return f"; 'actuated_characters recover {run}' {does}" if can else ""
+    return f"; 'actuated_characters info {run} --recover' {does}" if can else ""
 
 
 def _missing(bag: Path) -> str:

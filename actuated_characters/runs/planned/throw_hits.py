@@ -10,7 +10,8 @@ from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.arrays import FloatArray
 from sim_node.physics.balls.sphere_sweep import BallAndCharacter
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 from sim_node.simulation_factory import make_simulation_settings
 
 _LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character

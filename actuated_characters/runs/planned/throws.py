@@ -119,7 +119,7 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
             the ball to arrive, or the ball would touch the ground before.
         CommandError: a ball like that cannot be thrown.
     """
-    rate, size = plan.simulator.integer("rate"), request.size
+    rate, size = plan.simulation.rate_hz, request.size
     end = plan.ticks / rate
     if not 0.0 <= request.at < end:
         raise ConfigurationError(f"at is {request.at:g} s; it must be 0 s to less than {end:g} s")
@@ -135,10 +135,10 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
             f"the ball needs {ticks / rate:.3g} s to '{request.target}': let it hit later, or come "
             "from nearer"
         )
-    time, step = ticks / rate, 1.0 / (rate * plan.simulator.integer("substeps"))
+    time, step = ticks / rate, 1.0 / (rate * plan.simulation.substeps)
     start = impact.centre + request.speed * time * origin
     # the engine's fall: it moves on with the velocity at the end of each of its steps
-    rise = 0.5 * plan.simulator.number("gravity") * (time + step)
+    rise = 0.5 * plan.simulation.world.gravity * (time + step)
     velocity = -request.speed * origin + np.array((0.0, 0.0, rise))
     _check_ground(plan, request, min(float(start[2]), float(impact.centre[2])) - size)
     throw = ProjectileThrow(request.mass, size, _triple(start), _triple(velocity))
@@ -147,7 +147,7 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
 
 def _check_ground(plan: RunPlan, request: ThrowRequest, lowest: float) -> None:
     """Raise ConfigurationError if the lowest point of a ball's way, m, is in the ground."""
-    if plan.simulator.text("terrain") == PLANE and lowest < 0.0:
+    if plan.simulation.terrain == PLANE and lowest < 0.0:
         raise ConfigurationError(
             f"a ball with a radius of {request.size:.3g} m on its way to '{request.target}' would "
             f"be {-lowest:.2g} m in the ground; take a smaller 'radius', or another 'from'"

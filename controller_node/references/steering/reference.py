@@ -83,6 +83,10 @@ class SteeredReference:
         self._poses: dict[int, GeneralizedPosition] = {}
         self._no_acceleration = np.zeros(character.layout.size)
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the poses, which follow from the course."""
+        return vars(self) | {"_poses": {}}
+
     @property
     def repeat_ticks(self) -> int:
         """After how many ticks a command is to be given again, so that it does not time out."""

@@ -8,7 +8,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 
 _TOUCHING_DISTANCE = 1e-6  # m: what is nearer counts as touching
 _MOST_RADII = 20_000.0  # radii of the ball that it may come from at most

@@ -9,7 +9,7 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import mode_events
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
@@ -42,7 +42,7 @@ def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     assert summary_of(sent)["state_hash"] == summary_of(alone)["state_hash"]
     recording = read_recording(sent)
     assert recording.position[-1, 0] - recording.position[0, 0] > 0.2
-    labels = [span.label for span in mode_spans(recording)]
+    labels = [span.label for span in mode_events(recording)]
     assert labels[:4] == ["stand, right", "shift, right", "step, right", "step, left"]
     assert replay([recording]).identical
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
@@ -66,7 +66,7 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
     recording = read_recording(sent)
     start, flight = longest_flight(recording)
     assert 1.6 < start < 1.9 and flight >= 0.25
-    labels = [span.facts["state"] for span in mode_spans(recording)]
+    labels = [span.facts["state"] for span in mode_events(recording)]
     assert labels == ["stand", "crouch", "thrust", "flight", "land", "rest"]
     assert not np.nan_to_num(recording.effort)[:, :6].any()
     assert replay([recording]).identical

@@ -142,7 +142,7 @@ def test_a_long_file_solved_in_windows_is_the_same_as_solved_at_once(
 
 def test_a_file_of_the_own_skeleton_is_taken_as_it_is(tmp_path: Path, target: TargetBody) -> None:
     file = tmp_path / "own.bvh"
-    assert main(["motion", "export", "kick", "--output", str(file), "--units", "cm"]) == 0
+    assert main(["export", "kick", "--output", str(file), "--units", "cm"]) == 0
 
     made = import_bvh(file, target)
 

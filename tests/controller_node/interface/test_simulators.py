@@ -14,7 +14,6 @@ from msgs_config.bus.composition import ros_node
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import resolve
 from sim_node import parameters as of_simulator
 from sim_node.physics.probe import measure_probe
 from tests.support.physics import character
@@ -28,8 +27,7 @@ MOON = 1.62  # m/s^2
 
 def described(gravity: float) -> String:
     """The configuration of a simulator of the pendulum."""
-    declared = of_simulator.PARAMETERS + of_simulator.character_parameters(PENDULUM)
-    values = resolve(declared, {"character": "pendulum", "gravity": gravity})
+    values = of_simulator.resolve_alone(PENDULUM, {"character": "pendulum", "gravity": gravity})
     probe = measure_probe(PENDULUM, gravity)
     return String(data=configuration.describe(PENDULUM, values, probe=probe, session=SESSION))
 

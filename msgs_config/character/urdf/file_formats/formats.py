@@ -4,56 +4,19 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config.errors import CharacterError
+from msgs_config.file_kinds import describe_root
 
 URDF_SUFFIXES = (".urdf", ".xacro", ".xml")
 """Of files that a URDF may be in, in lower case."""
 YAML_SUFFIXES = (".yaml", ".yml")
 
-_REMEDY = "a character is a .urdf or .xacro file, or a .yaml file that names one"
-_MESH = f"a mesh, which a URDF can name in <mesh>; {_REMEDY}"
-_MODEL = f"a model; {_REMEDY}"
-_USD = f"USD, a scene of Omniverse or Isaac Sim; {_REMEDY}: robots in USD come from one as a rule"
-_SDF = f"SDF, Gazebo's format of models and worlds; {_REMEDY}"
-_MJCF = f"MJCF, MuJoCo's format; {_REMEDY}"
-_DATA = f"data, and no robot; {_REMEDY}"
-_BY_SUFFIX = {
-    ".sdf": _SDF,
-    ".world": _SDF,
-    ".mjcf": _MJCF,
-    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
-    ".srdf": f"SRDF, what MoveIt adds to a URDF; {_REMEDY}",
-    ".proto": f"PROTO, Webots' format; {_REMEDY}",
-    **dict.fromkeys((".stl", ".obj", ".dae", ".glb", ".gltf", ".ply", ".fbx"), _MESH),
-    **dict.fromkeys((".step", ".stp", ".sldasm", ".blend"), _MODEL),
-    **dict.fromkeys((".npz", ".npy", ".csv", ".json", ".pkl", ".pt"), _DATA),
-    **dict.fromkeys((".mcap", ".db3"), f"a recording; {_REMEDY}"),
-    ".bvh": f"captured motion: 'motion import' makes a clip of it; {_REMEDY}",
-}
-_BY_ROOT = {
-    "sdf": _SDF,
-    "world": _SDF,
-    "model": _SDF,
-    "gazebo": _SDF,
-    "mujoco": _MJCF,
-    "mujocoinclude": _MJCF,
-    "COLLADA": _MESH,
-    "package": f"a ROS package's description; {_REMEDY}",
-    "launch": f"a launch file; {_REMEDY}",
-    "html": f"a web page, not the file itself; {_REMEDY}",
-}
+CHARACTER_FILE = "a character, which is a .urdf or .xacro file, or a .yaml file that names one"
 _XACRO_SPACE = "xacro"  # is in every address under which xacro's name space is declared
 
 
 def is_urdf(path: Path) -> bool:
     """Whether a file's name is one of a URDF, not of a YAML file that names one."""
     return path.suffix.lower() in URDF_SUFFIXES
-
-
-def check_suffix(path: Path) -> None:
-    """Raise CharacterError for a file that is no character by its name; says what it is."""
-    what = _BY_SUFFIX.get(path.suffix.lower())
-    if what is not None:
-        raise CharacterError(f"{path} is {what}")
 
 
 def check_root(path: Path, robot: ElementTree.Element) -> None:
@@ -63,8 +26,8 @@ def check_root(path: Path, robot: ElementTree.Element) -> None:
         CharacterError: it is not so; says what the file is.
     """
     if robot.tag != "robot":
-        what = _BY_ROOT.get(robot.tag, f"XML whose root is <{robot.tag[:100]}>; {_REMEDY}")
-        raise CharacterError(f"{path} is {what}")
+        what, advice = describe_root(robot.tag)
+        raise CharacterError(f"{path} is {what}, not {CHARACTER_FILE}; {advice}")
     found = _find_xacro(robot)
     if found:
         raise CharacterError(

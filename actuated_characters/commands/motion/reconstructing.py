@@ -1,4 +1,4 @@
-"""The command `actuated_characters reconstruct`: captured motion with joint torques alone."""
+"""The command `actuated_characters motion reconstruct`: a clip by joint torques alone."""
 
 import argparse
 import os
@@ -29,8 +29,8 @@ _FOLDER, _SUFFIX = Path("reconstructions"), ".json"
 _OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers", "planning_delay_ticks")
 
 
-def add_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
-    """Add the command to those of `actuated_characters`."""
+def add_motion_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters motion`."""
     command = add_command(
         commands,
         _reconstruct,
@@ -40,7 +40,7 @@ def add_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> None:
         "window, until the character does it without root assistance (sampling-based motion "
         "control, Liu et al. 2010, with planned samples). The result is a clip file with the plan "
         "and the parameters of its run: play it with `run --clip FILE`.",
-        ["reconstruct --clip walk --cycles 4 --output walk.json"],
+        ["motion reconstruct --clip walk --cycles 4 --output walk.json"],
     )
     add_character(command)
     command.add_argument("--clip", default="walk", help="name of a clip, or a file (%(default)s)")
@@ -110,7 +110,7 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import SearchSettings
-    from sim_node.node_settings import make_node_settings
+    from sim_node.node_settings import NodeSettings
 
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
     if workers < 1:
@@ -119,7 +119,9 @@ def _job(options: argparse.Namespace) -> "Job":
     given = node_settings(options.set, NODES)
     for name in _OWN:
         if name in given["controller_node"]:
-            raise ConfigurationError(f"--set controller_node.{name}: reconstruct sets it itself")
+            raise ConfigurationError(
+                f"--set controller_node.{name}: motion reconstruct sets it itself"
+            )
     simulator = {"rate": options.rate, "command_delay_ticks": options.delay_ticks}
     problem = Problem(
         options.character,
@@ -133,10 +135,10 @@ def _job(options: argparse.Namespace) -> "Job":
     settings.check()
     plan = problem.plan()  # mistakes are reported before anything begins
     problem.planned_pushes(plan)
-    if make_node_settings(plan.simulator).tick_period:
+    if NodeSettings.of(plan.simulator).tick_period:
         raise ConfigurationError(
-            "reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor a "
-            "'real_time_factor'"
+            "motion reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor "
+            "a 'real_time_factor'"
         )
     if options.output is None:
         output.parent.mkdir(exist_ok=True)

@@ -1,18 +1,25 @@
 """Two recordings side by side, tick by tick and to the last bit."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics import error_measures
 from actuated_characters.metrics.recording_metrics import measure_recording
-from actuated_characters.report.changes import differences
+from actuated_characters.render.plots import label, make_panels
+from actuated_characters.report.decimation import decimated
+from actuated_characters.report.events import differences
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 
+if TYPE_CHECKING:  # it takes a while to import
+    from matplotlib.figure import Figure
+
+_PANEL = (11.0, 3.4)  # inches, of each character's panel
+_LOG_ZERO = 1e-17  # rad or m; stands for 0 on a logarithmic axis
 _QUANTITIES = ("effort", "position", "velocity")  # by cause: a state's effort came before it
 
 
@@ -64,6 +71,31 @@ class RecordingComparison:
     def identical(self) -> bool:
         """Whether both have the same states, and no others."""
         return self.first is None and self.states == (self.common, self.common)
+
+
+def draw_comparisons(comparisons: list[RecordingComparison]) -> "Figure":
+    """One panel a character: the difference of joints, sliders and root over time."""
+    width, height = _PANEL
+    figure, panels = make_panels(len(comparisons), 1, (width, height * len(comparisons)))
+    for panel, comparison in zip(panels, comparisons, strict=True):
+        growth = comparison.growth
+        curves = {
+            "joints, largest (rad)": growth.joints,
+            "sliders, largest (m)": growth.sliders,
+            "root (m)": growth.root,
+        }
+        known = {name: values for name, values in curves.items() if not np.isnan(values).all()}
+        for name, values in known.items():
+            times, drawn = decimated(growth.times, np.maximum(values, _LOG_ZERO)[:, np.newaxis])
+            panel.plot(times, drawn[:, 0], linewidth=0.9, label=name)
+        if comparison.first is not None:
+            time = comparison.first.time
+            panel.axvline(time, color="black", linestyle=":", label="first difference")
+        panel.set_yscale("log")
+        panel.set_ylim(bottom=_LOG_ZERO)
+        legend = "lower right" if known or comparison.first is not None else None
+        label(panel, "simulation time (s)", "difference", comparison.name, legend=legend)
+    return figure
 
 
 _Rows: TypeAlias = tuple[Recording, IntArray]
@@ -136,6 +168,9 @@ def _first_difference(
     (recording, rows), earliest = first, None
     for quantity in _QUANTITIES:
         ours, theirs = _values(first, quantity), _values(second, quantity)
+        for each, its_rows in (first, second):
+            if quantity == "effort" and each.keyframe is not None:
+                ours[its_rows == 0] = theirs[its_rows == 0] = np.nan  # that is in the bag before
         differs = error_measures.different_bits(ours, theirs)
         if not differs.any():
             continue
