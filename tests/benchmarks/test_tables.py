@@ -128,7 +128,7 @@ def test_walks_are_pushed_as_their_kind_says() -> None:
 def test_a_ball_arrives_from_its_side_at_its_time() -> None:
     (case,) = push_cases("balls", Options(runs=1))
     plan = case.plan()
-    clock = TickClock(plan.simulator.integer("rate"))
+    clock = TickClock(plan.simulation.rate_hz)
 
     throws, _ = plan_throws(plan, case.throws)
 
@@ -203,7 +203,7 @@ def test_a_capture_is_tracked_with_assistance_and_planned(tmp_path: Path) -> Non
 
     assert assisted.facts["up, unit, rest"] == "y, ?, T"
     assert str(assisted.facts["worst joint, rad"]).startswith("right_ankle 0.0")
-    planners = [each.plan().controller.text("planner") for each in (assisted, alone)]
+    planners = [each.plan().controller["planner"] for each in (assisted, alone)]
     assert planners == ["none", "predictive"]
 
 
