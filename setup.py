@@ -73,9 +73,6 @@ setup(
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
         "docs": ["furo>=2024.8", "myst-parser>=4,<6", "sphinx>=8,<9"],
-        # `python -m benchmarks.athletics.search`: parameters of state machines by CMA-ES (300 kB,
-        # BSD-3, pure Python).
-        "search": ["cma>=4,<5"],
         # Completion of the command line in bash and zsh (43 kB, Apache-2.0, pure Python).
         "completion": ["argcomplete>=3.5,<4"],
         # `view` and `run --view`: characters in a browser (50 MB with what it needs, MIT; the web
@@ -96,7 +93,6 @@ setup(
         "test": [
             "argcomplete>=3.5,<4",
             "av>=14,<19",
-            "cma>=4,<5",
             "furo>=2024.8",
             "gymnasium>=1.0,<2",
             "hypothesis>=6.98,<7",

@@ -16,7 +16,7 @@ from actuated_characters.given_arrays import (
     is_same_first,
     real_array,
 )
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import run_in_process
@@ -25,7 +25,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
-from msgs_config.character.followers import check_undriven
+from msgs_config.character.joints.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
@@ -133,7 +133,7 @@ class Controller:
         Raises:
             ActuatedCharactersError: the message is no state of the character.
         """
-        from msgs_config.messages.ros_state import effort_message, read_state
+        from msgs_config.bus.ros_state import effort_message, read_state
 
         layout = self.character.layout
         effort = self.compute_effort(read_state(layout, message))

@@ -143,8 +143,8 @@ class LawContext:
 
     layout: JointLayout
     model: DynamicsModel
-    period: float  # s, of control
-    series: EffortSeries | None = None  # of the law `feedforward`
+    period: float  # control period, s
+    series: EffortSeries | None = None  # what the law `feedforward` plays
 
 
 class TrackingInput(NamedTuple):
@@ -154,7 +154,7 @@ class TrackingInput(NamedTuple):
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     now: ReferenceState
-    upcoming: ReferenceState  # one tick later
+    upcoming: ReferenceState  # desired one tick later
     offset: FloatArray | None = None  # (n,) of a planner, added to the errors
     effort: FloatArray | None = None  # (n,) of a behaviour, added to the law's
 

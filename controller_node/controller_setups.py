@@ -31,7 +31,7 @@ class ControllerSetup:
 
     values: Values
     controller: Controller
-    first_state: StampedState  # in which its reference begins
+    first_state: StampedState  # the state in which its reference begins
     drives_root: bool
     driven: IntArray  # the entries of the effort that it drives
     warnings: tuple[str, ...]

@@ -11,7 +11,7 @@ from controller_node.controller import Controller
 from controller_node.controller_setups import ControllerSetups
 from controller_node.interface.answer_report import AnswerReport
 from controller_node.interface.awaited_messages import AwaitedMessages
-from controller_node.interface.publishers import Publishers, Reply
+from controller_node.interface.publishers import ControllerPublishers, Reply
 from controller_node.interface.simulator_check import check_simulator
 from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
@@ -103,7 +103,7 @@ class ControllerNode(ComposableNode):
         self._pending_state: bytes | None = None  # a state whose other messages are awaited
         # After all others: a simulator that has found this one has found the others as well.
         self._states = self.node.subscription(topics.JOINT_STATES)
-        self._outputs = Publishers(
+        self._outputs = ControllerPublishers(
             self.node, self._layout, self._setups.in_force.driven, self._simulators.bound
         )
         self._stamped_topics = StampedTopics(self.node, controller, self._outputs, logger)
@@ -135,7 +135,7 @@ class ControllerNode(ComposableNode):
     def _publish_first_state(self) -> None:
         """Publish where the next episode's reference begins, if that is new."""
         first = self._setups.first_state
-        if first is not self._published_first:
+        if first is not self._published_first:  # each setup of an episode makes a new object
             self._published_first = first
             self._outputs.publish_initial_state(first)
 
@@ -158,7 +158,7 @@ class ControllerNode(ComposableNode):
     def _spin_once(self, executor: Executor) -> float:
         """Answer a state if there is one; the turn's result."""
         self._report.publish(self._other_counts)
-        self._simulators.look(time.monotonic())
+        self._simulators.take_messages(time.monotonic())
         raw = self._next_state()
         if raw is not None:
             executor.received()
@@ -283,7 +283,8 @@ class ControllerNode(ComposableNode):
         from the latched topic, once.
         """
         if state.effort is None:
-            self._simulators.look(time.monotonic())  # a changed configuration came before the state
+            # A changed configuration came before the state.
+            self._simulators.take_messages(time.monotonic())
             if self._simulators.bound is None:
                 return None  # not the simulator that this controller was made for
             self._begin_episode(state.stamp_ns)

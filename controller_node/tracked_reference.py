@@ -31,7 +31,7 @@ class TrackedReference:
     ) -> None:
         """Begin with a reference; `episode_ns` is the stamp of the episode's first state."""
         self.follows_velocity = True  # the reference's; else the velocity to track is zero
-        self.target: Target | None = None  # of a behaviour, instead of the reference itself
+        self.target: Target | None = None  # a behaviour's, instead of the reference itself
         self._character, self._reference, self._clock = character, reference, clock
         self._together = _sampled_together(reference)  # None: it samples one state at a time
         self._first_tick = clock.first_tick_from(episode_ns)

@@ -23,11 +23,11 @@ HIT = 1.0  # s
 _SPEED = 8.0  # m/s
 _LENGTH, _LONG = 4.0, 8.0  # s, of the runs; of those that fall and get up
 _RAGDOLL_HIT = 0.15  # s: later it is out of the ball's way
-_AROUND = 0.05  # s before and after the hit between which the ball's momentum is compared
+_MOMENTUM_SPAN = 0.05  # s before and after the hit between which the ball's momentum is compared
 _AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_POSES = {  # for each run: what is seen, and when, s
+_POSES = {  # what is seen of each run, and when, s
     "ragdoll": (
         "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
         (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
@@ -135,7 +135,7 @@ def measure(run: Recording, alone: Recording, hit: float) -> HitEffects:
 
 def lost_momentum(run: Recording, hit: float) -> float:
     """Momentum in N s that the only ball has lost around a time in s, without gravity's part."""
-    before, after = np.searchsorted(run.times, (hit - _AROUND, hit + _AROUND))
+    before, after = np.searchsorted(run.times, (hit - _MOMENTUM_SPAN, hit + _MOMENTUM_SPAN))
     motions = [run.balls[row] for row in (before, after)]
     (throw,) = [throw for each in run.throws for throw in each]
     if any(motion is None for motion in motions):

@@ -64,7 +64,7 @@ class Observed:
     trial: Trial
     recording: Recording
     motion: RigidBodyMotion  # (t + 1) simulated states
-    theory: RigidBodyMotion  # at the same times
+    theory: RigidBodyMotion  # the theory at the same times
     momenta: Momenta
 
     @property

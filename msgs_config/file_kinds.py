@@ -30,7 +30,7 @@ _UNPACK = "unpack it, and give what is in it"
 _MESH = "a character's URDF names its meshes"
 _FROM_URDF = "a URDF of a robot can be a character"
 _BAG = "'info', 'report', 'render', 'view' and 'export' take it"
-_KINDS: dict[str, tuple[str, str]] = {  # by suffix: what it is, and what to do
+_KINDS: dict[str, tuple[str, str]] = {  # what a file is, and what to do with it, by suffix
     ".fbx": ("an FBX scene", _SCENE),
     ".blend": ("a Blender scene", _SCENE),
     ".glb": ("a glTF scene", _SCENE),

@@ -17,7 +17,7 @@ import yaml
 from msgs_config.errors import ActuatedCharactersError
 
 _find_in_ros: Callable[[str], str] | None = None
-with suppress(ImportError):  # without ROS
+with suppress(ImportError):  # there may be no ROS
     from ament_index_python.packages import get_package_share_directory as _find_in_ros
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
@@ -195,7 +195,7 @@ def parse_yaml(
 
 
 _TAG = "tag:yaml.org,2002:"
-_NUMBERS = {  # of YAML 1.2 and JSON
+_NUMBERS = {  # the forms of numbers in YAML 1.2 and JSON
     "int": r"[-+]?[0-9]+",
     "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
     r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",

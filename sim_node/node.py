@@ -37,7 +37,7 @@ from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
 _STOP_FLUSH_TIME = 0.5  # s that subscribers may take after a signal or an error
-_MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
+_MOST_COMMANDS = 1000  # taken in a row in real time; a flood must not stop the world
 
 
 class SimNode(ComposableNode):
@@ -242,7 +242,7 @@ class SimNode(ComposableNode):
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
             self._conflict_log.log()
-            self._others.look()
+            self._others.look_at_graph()
         for event in self._watchdog.due(now):
             waits = self._control.runs and not self._complete
             if event is WatchdogEvent.REPUBLISH:

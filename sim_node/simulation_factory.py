@@ -6,7 +6,7 @@ from pathlib import Path
 from msgs_config import files
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
-from msgs_config.character.urdf.source import read_urdf_text
+from msgs_config.character.urdf.file_formats.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE

@@ -162,9 +162,9 @@ def _reading(path: Path) -> Iterator[ExitStack]:
             yield stack
         except RecordingError:
             raise
-        except Exception as error:  # for a damaged file the libraries raise anything
+        except Exception as error:  # the libraries raise anything for a damaged file
             text = f"cannot read recording {path}: {storage.reason(error)}"
-            if path.is_dir():  # of a file alone there is nothing to recover
+            if path.is_dir():  # nothing can be recovered of a file alone
                 text += metadata.recover_hint(path, "keeps what is whole of it")
             raise RecordingError(text) from error
 

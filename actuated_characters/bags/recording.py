@@ -58,7 +58,7 @@ class Recording:
     Tick k leads from state k to state k + 1. Units and frames: docs/topics.md, "Conventions".
     """
 
-    character: Character  # in its place in the world, made from the texts in the bag
+    character: Character  # made from the texts in the bag, in its place in the world
     name: str = ""  # its topics' namespace without the leading slash
     parameters: Mapping[str, Any] = field(repr=False)  # the simulator's parameters at the start
     # the simulator's parameters, set after set; empty where they never changed
@@ -78,7 +78,7 @@ class Recording:
     controller: tuple[NodeParameters, ...] = ()  # the controller's parameters, set after set
     modes: tuple[ModeChange, ...] = ()  # the controller's changes of mode, in order
     plans: tuple[PlanArrays, ...] = ()  # the plans of a planner, in order
-    unstamped_commands: tuple[CommandArrays, ...] = ()  # in real time: those that answer no state
+    unstamped_commands: tuple[CommandArrays, ...] = ()  # commands of real time that answer no state
     pushes_sent: int = 0  # messages on `external_wrench`
     # (t,): throws that each tick began with; () if there were none
     throws: tuple[tuple[ProjectileThrow, ...], ...] = ()

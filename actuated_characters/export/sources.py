@@ -10,7 +10,7 @@ import numpy as np
 from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.robots.reading import RobotSource, read_any
-from actuated_characters.render.scene import Scene, make_scene
+from actuated_characters.render.scene import RecordedScene, make_scene
 from character_motion.export.trajectories import (
     BallTrajectory,
     CharacterTrajectory,
@@ -26,7 +26,7 @@ from msgs_config.file_kinds import refuse_other_kind
 _CHARACTER = "humanoid"
 _CLIP_SUFFIXES = (".txt", ".json")
 _HIGHEST_RATE = 60.0  # Hz, at which a recording is sampled unless told
-_UNEQUAL = 0.05  # part of a frame's duration by which another may differ
+_DURATION_TOLERANCE = 0.05  # part of a frame's duration by which another may differ
 _AWAY_DISTANCE = 1000.0  # m: a ball farther away has been taken out of the way
 
 
@@ -83,7 +83,7 @@ def of_clip(character: Character, name_or_path: str) -> Trajectories:
     frames = read_clip(character, name_or_path)
     durations = np.diff(frames.times)
     usual = float(np.median(durations))
-    equal = np.abs(durations - usual).max() <= _UNEQUAL * usual
+    equal = np.abs(durations - usual).max() <= _DURATION_TOLERANCE * usual
     rate = len(durations) / float(frames.times[-1]) if equal else round(1.0 / usual)
     configurations = GeneralizedPosition(frames.positions, frames.orientations_xyzw)
     trajectory = CharacterTrajectory(character.name, character, configurations)
@@ -116,7 +116,7 @@ def of_recordings(recordings: Sequence[Recording]) -> Trajectories:
     )
 
 
-def _balls(scene: Scene) -> Iterator[BallTrajectory]:
+def _balls(scene: RecordedScene) -> Iterator[BallTrajectory]:
     """Each ball of each episode."""
     states = scene.recordings[0].balls
     if not states:

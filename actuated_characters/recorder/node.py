@@ -89,7 +89,7 @@ class RecorderNode(DdsNode):
 
     def _search(self) -> float:
         """Record topics whose first publisher has come; returns when to look again, s."""
-        for recorded, offered in self._named.look():
+        for recorded, offered in self._named.find_published():
             try:
                 self._add(recorded, offered)
             except RecordingError as error:

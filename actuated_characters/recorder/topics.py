@@ -12,13 +12,13 @@ from msgs_config.messages import topics
 from msgs_config.messages.topic import Kept, Topic
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
-_RECORDED = [
+_RECORDED_TOPICS = [
     topic
     for each in reversed(topics.TABLE)
     if each.kept in (Kept.UNLESS_EXCLUDED, Kept.ALWAYS) and each.is_installed
     for topic in each.as_others_name_it
 ]
-EXCLUDABLE = sorted(topic.name for topic in _RECORDED if topic.kept is not Kept.ALWAYS)
+EXCLUDABLE = sorted(topic.name for topic in _RECORDED_TOPICS if topic.kept is not Kept.ALWAYS)
 """Topics that a recording may do without."""
 
 
@@ -62,8 +62,8 @@ def contract_topics(
     if twice:
         raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
     check_names(node, "characters", characters)
-    found = [_recorded(node, topic, None) for topic in _RECORDED if topic.of_world]
-    of_each = [topic for topic in _RECORDED if not topic.of_world]
+    found = [_recorded(node, topic, None) for topic in _RECORDED_TOPICS if topic.of_world]
+    of_each = [topic for topic in _RECORDED_TOPICS if not topic.of_world]
     found += [_recorded(node, topic, name) for topic in of_each for name in characters]
     left_out: list[RecordedTopic] = []
     for name in exclude:

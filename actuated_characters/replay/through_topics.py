@@ -51,7 +51,7 @@ _NOT_TO_BE_SET = (
     "rate",
     "wait_for_subscribers",
 )
-_APPLIED = (
+_APPLIED_EFFORTS_REMARK = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"
 )
@@ -92,7 +92,7 @@ def replay_commands(
         except RunError as error:
             failure = error  # matters only if nothing is found to differ
         found = _found_states(player, file, len(together))
-    remarks += [_APPLIED] if are_applied else []
+    remarks += [_APPLIED_EFFORTS_REMARK] if are_applied else []
     result = compare_world(together, found, tolerance, remarks) if found else None
     if result is None or (failure is not None and result.identical):
         raise failure or RunError("the player has received no states")

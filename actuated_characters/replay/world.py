@@ -78,7 +78,7 @@ class ResetChanges:
     """What is different from an episode on."""
 
     world: WorldSettings
-    states: Mapping[str, StampedState]  # where characters begin, by their names in the world
+    states: Mapping[str, StampedState]  # first states by the characters' names in the world
 
 
 def changes_of_reset(

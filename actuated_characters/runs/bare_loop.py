@@ -11,8 +11,8 @@ from actuated_characters.runs.planned.wrenches import PlannedPush, push_schedule
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller
 from msgs_config.messages.clock import TickClock
+from sim_node.physics.balls.throws import ThrowQueue
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowQueue
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 Watch = Callable[[Simulation], object]

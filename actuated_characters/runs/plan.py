@@ -58,7 +58,7 @@ class RunPlan:
     reference: Reference
     simulator: Values
     controller: Values
-    warnings: tuple[str, ...]  # that the user should read
+    warnings: tuple[str, ...]  # the user should read them
 
     @property
     def ticks(self) -> int:

@@ -95,7 +95,7 @@ def _values(path: Path, rows: Sequence[tuple[int, str]], width: int) -> FloatArr
             values[frame] = words
         except ValueError:
             values[frame] = [parse_number(word) for word in words]
-        if not (np.abs(values[frame]) <= LARGEST).all():  # NaN is refused, too
+        if not (np.abs(values[frame]) <= LARGEST).all():  # this refuses NaN as well
             bad = words[int(np.argmin(np.abs(values[frame]) <= LARGEST))]
             raise wrong_line(path, number, bad, f"finite numbers up to {LARGEST:g}, as all are")
     return values

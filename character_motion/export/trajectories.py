@@ -25,7 +25,7 @@ Progress = Callable[[int], None]
 class CharacterTrajectory:
     """The positions of one character at t times; rotations are in the quaternions alone."""
 
-    name: str  # its name in its world; the character's own where it has none there
+    name: str  # name in its world, or the character's own
     character: Character
     configurations: GeneralizedPosition  # (t, n) message form, (t, k, 4)
 

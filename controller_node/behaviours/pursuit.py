@@ -28,9 +28,9 @@ from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 
 _TURN_SPEED = 3.0  # rad/s, of the target's heading at most
-_STANDING = 0.8  # share of the own reference's root height: an opponent below it is down
+_STANDING_HEIGHT = 0.8  # share of the own reference's root height: an opponent below it is down
 _CLEARANCE = 2.0  # m, to which it goes away from an opponent that is down
-_NEAREST = 1e-3  # m; nearer than that no way leads to the opponent
+_MIN_DISTANCE = 1e-3  # m; nearer than that no way leads to the opponent
 _ONTO = 0.3  # s, until a strike's motion is reached
 
 
@@ -93,7 +93,7 @@ class Pursuit(Reaction):
     def advance(self, seen: Observation) -> BehaviourOutput:
         """As an active ragdoll, with the own reference where the opponent draws it."""
         output = super().advance(seen)
-        if self._target is self._own:
+        if self._target is self._own:  # the object of the own reference, not one that equals it
             self.carry = self._drawn(seen)
         else:
             self._heading = None
@@ -133,12 +133,14 @@ class Pursuit(Reaction):
         """The way to the opponent, m, world; ahead if it is here."""
         assert seen.opponent is not None
         x, y = (seen.opponent - seen.position[:3])[:2].tolist()
-        return (x, y) if _length((x, y)) > _NEAREST else (_NEAREST, 0.0)
+        return (x, y) if _length((x, y)) > _MIN_DISTANCE else (_MIN_DISTANCE, 0.0)
 
     def _is_down(self, seen: Observation) -> bool:
         """Whether the opponent lies, or is yet to stand up."""
         assert seen.opponent is not None
-        return float(seen.opponent[2]) < _STANDING * float(seen.now.configuration.position[2])
+        return float(seen.opponent[2]) < _STANDING_HEIGHT * float(
+            seen.now.configuration.position[2]
+        )
 
     def _drawn(self, seen: Observation) -> PlanarTransform:
         """The move of the reference to ahead of the body, with a heading to the opponent.

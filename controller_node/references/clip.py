@@ -48,7 +48,7 @@ class ClipReference:
         self._velocities = self._segment_velocities()
         self._no_acceleration = np.zeros(layout.size)
         self._last = self._at_end()
-        self._cycle_motions: dict[int, _CycleMotion] = {}  # of this cycle and the next
+        self._cycle_motions: dict[int, _CycleMotion] = {}  # this cycle's and the next one's
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the clip's first frame."""

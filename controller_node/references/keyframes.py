@@ -19,7 +19,7 @@ from msgs_config.settings import Settings, parameter
 KEYFRAMES_DIRECTORY = Path(__file__).parent / "data"
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # shares of a segment, where its path is compared with limits
-_NOTICED = 1e-6  # rad or m beyond a limit that lead to a warning
+_LIMIT_TOLERANCE = 1e-6  # rad or m beyond a limit that lead to a warning
 _FILES = (".yaml", ".yml")
 
 
@@ -106,7 +106,7 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
         times, values = curve.coordinate(index, _SHARES)
         beyond = np.maximum(lower[index] - values, values - upper[index])
         worst = np.unravel_index(beyond.argmax(), beyond.shape)
-        if beyond[worst] > _NOTICED:
+        if beyond[worst] > _LIMIT_TOLERANCE:
             warnings.append(
                 f"the path between keyframes leaves the limits of "
                 f"'{character.layout.dof_names[index]}', {limits.text(index)}, by "

@@ -11,7 +11,7 @@ from actuated_characters.render.stills import strip
 from actuated_characters.report.events import mode_events
 from lecture.athletics.measures import (
     FEET,
-    Course,
+    CourseSeries,
     loaded,
     longest_flight,
     taken,
@@ -26,7 +26,7 @@ _JUMP_POSES = (0.9, 1.55, 1.7, 1.85, 2.0, 2.1, 2.5, 3.5)  # s
 
 
 def draw_courses(
-    result: StudyResult, name: str, title: str, runs: Mapping[str, Recording], wanted: Course
+    result: StudyResult, name: str, title: str, runs: Mapping[str, Recording], wanted: CourseSeries
 ) -> None:
     """A column a run of the same commands: which foot stands, speed, heading."""
     panels = result.add_panels(name, 3, len(runs), (12.0, 7.0), title=title, same_x=True)

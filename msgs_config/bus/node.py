@@ -21,7 +21,7 @@ class Received(NamedTuple):
 
     raw: bytes
     published_ns: int  # wall time
-    number: int | None  # that its publisher gave it, from 1 on; None where the bus has none
+    number: int | None  # its publisher's count, from 1 on; None where the bus has none
 
 
 class Publisher(Protocol):

@@ -8,7 +8,7 @@ from typing import Any
 from msgs_config import files
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
-from msgs_config.character.urdf.formats import (
+from msgs_config.character.urdf.file_formats.formats import (
     CHARACTER_FILE,
     URDF_SUFFIXES,
     YAML_SUFFIXES,

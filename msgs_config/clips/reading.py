@@ -23,7 +23,7 @@ from msgs_config.files import read_text
 from msgs_config.geometry import fixed_order, rotations
 
 _SUFFIXES = (".txt", ".json")
-_BEGINNING = 256  # bytes of a file, in which a JSON object begins
+_BEGINNING_BYTES = 256  # bytes of a file, in which a JSON object begins
 _ROOT_COLUMNS = 8  # 1 for the duration, 3 for the position, 4 for the quaternion
 _SHORTEST_QUATERNION = 0.1
 _LARGEST_NUMBER = 1e6  # m or s
@@ -146,7 +146,7 @@ def is_note(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            return not file.read(_BEGINNING).lstrip().startswith(b"{")
+            return not file.read(_BEGINNING_BYTES).lstrip().startswith(b"{")
     except OSError:
         return False  # reading it as a clip tells why
 

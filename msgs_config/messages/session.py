@@ -101,7 +101,7 @@ class SessionBinding:
         self._silence: float | None = None  # s; None before another session speaks
         self._looked_at: float | None = None
 
-    def look(self, now: float) -> None:
+    def note_look(self, now: float) -> None:
         """Note, at every turn, that the receiver looks for messages; `now` in s."""
         if self._looked_at is not None and self._silence is not None:
             self._silence += min(max(now - self._looked_at, 0.0), _LONGEST_LOOK)

@@ -94,7 +94,7 @@ class InitialStates:
         return found
 
     def _look(self) -> dict[str, StampedState]:
-        found = {each.name: each.look() for each in self._subscriptions}
+        found = {each.name: each.last_state() for each in self._subscriptions}
         return {name: state for name, state in found.items() if state is not None}
 
     def _missing(self, found: Mapping[str, StampedState]) -> list["_Subscription"]:
@@ -118,7 +118,7 @@ class _Subscription:
         self._contested = False
         self._rejection = ""
 
-    def look(self) -> StampedState | None:
+    def last_state(self) -> StampedState | None:
         """The last state of the only controller; None while it is missing.
 
         A message does not name its publisher. So while there are several, their states do not

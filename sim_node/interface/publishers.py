@@ -22,7 +22,7 @@ from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 
-class Publishers:
+class CharacterPublishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
@@ -190,7 +190,7 @@ class Publishers:
 
 def wait_for_subscribers(
     node: BusNode,
-    publishers: Sequence[Publishers],
+    publishers: Sequence[CharacterPublishers],
     wanted: int,
     stop: StopFlag,
 ) -> Turns:

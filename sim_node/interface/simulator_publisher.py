@@ -10,7 +10,7 @@ from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.runtime.throttle import Throttle
 from sim_node.interface.keyframes import SimulatorKeyframes
-from sim_node.interface.publishers import Publishers
+from sim_node.interface.publishers import CharacterPublishers
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters
@@ -28,7 +28,7 @@ class SimulatorPublisher:
         node: BusNode,
         simulation: Simulation,
         world: WorldInterface,
-        of_characters: Sequence[Publishers],
+        of_characters: Sequence[CharacterPublishers],
         samples: Sequence[DynamicsSample],
         keyframes: SimulatorKeyframes,
     ) -> None:

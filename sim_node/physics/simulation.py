@@ -23,12 +23,12 @@ from sim_node.physics.wrenches import ExternalWrench
 class Snapshot:
     """A state between two ticks, for any simulation of equal setups."""
 
-    settings: SimulationSettings  # of the episode
+    settings: SimulationSettings  # the episode's
     tick: int
     episode: int
     characters: tuple[CharacterSnapshot, ...]
-    throws: tuple[ProjectileThrow, ...]  # of the last tick
-    balls: tuple[ProjectileThrow, ...]  # that are in the world
+    throws: tuple[ProjectileThrow, ...]  # those of the last tick
+    balls: tuple[ProjectileThrow, ...]  # those that are in the world
     thrown_at: tuple[int, ...]  # the tick at which each ball was thrown
     world: bytes  # the engine's state
 
@@ -69,7 +69,7 @@ class Simulation:
         # Finding out what touches takes time: it is done in each of several substeps, and after a
         # single one only if it is read.
         self.watches_contacts = False
-        self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
+        self.throws: tuple[ProjectileThrow, ...] = ()  # those at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
         self._is_closed = False
         self._world = self._fresh_world()
@@ -154,7 +154,7 @@ class Simulation:
             for character in self.characters:
                 character.check_divergence(self.tick)
         except SimulationError:
-            self.tick -= 1  # that state is not published; the first one after a reset has its stamp
+            self.tick -= 1  # it is not published: the first after a reset has its stamp
             raise
 
     def _move_balls(self, throws: Sequence[ProjectileThrow]) -> None:

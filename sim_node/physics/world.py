@@ -13,15 +13,15 @@ from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.model import Character
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
+from sim_node.physics.balls.projectiles import Projectiles
 from sim_node.physics.body import Body
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
-from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.settings import WorldSettings
 from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine saves its state to files only
 _RAYS = 10_000  # rays in one call; the engine takes up to 16,383
-_DEEPEST = 1000.0  # m: how far below a point a surface is looked for
+_MAX_DEPTH = 1000.0  # m: how far below a point a surface is looked for
 
 
 class World:
@@ -138,7 +138,7 @@ class World:
         heights = np.zeros(len(points))
         for first in range(0, len(points), _RAYS):
             rows = points[first : first + _RAYS]
-            ends = rows - (0.0, 0.0, _DEEPEST)
+            ends = rows - (0.0, 0.0, _MAX_DEPTH)
             hits = pybullet.rayTestBatch(rows.tolist(), ends.tolist(), physicsClientId=self._client)
             for row, (body, _, _, place, _) in enumerate(hits, start=first):
                 if body >= 0:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from actuated_characters.bags.recording import read_recordings
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.bare_loop import ticks_in_process

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet
 
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.scenes.scene import SIMULATOR, Scene
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller

@@ -36,17 +36,16 @@ from msgs_config.errors import RecordingError
 _ALL = Beginning()
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # a record's kind, and the length of its content
-_MESSAGE_HEAD = struct.Struct(
-    "<HIQQ"
-)  # channel, number, log time, time of publishing; then the message
+# Channel, number, log time and time of publishing, before the message itself.
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
 _MESSAGE, _CHUNK = int(Opcode.MESSAGE), int(Opcode.CHUNK)
 _IN_CHUNK = {int(Opcode.SCHEMA), int(Opcode.CHANNEL), _MESSAGE}
-_ENDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # a file's last records: kind, length
-_UNKNOWN = range(max(Opcode) + 1, 0x80)  # kinds that MCAP lacks; other programs' begin at 0x80
+_LAST_RECORDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # kinds and lengths
+_UNKNOWN_OPCODES = range(max(Opcode) + 1, 0x80)  # at 0x80 those of other programs begin
 _BEHIND_SUMMARY_CRC = 4 + len(_MAGIC)  # bytes from the checksum to the end
 _CUT_OFF = "bytes cut off"
 _MOST_NAMED = 5  # kinds of damage that a sentence names
-_LEAST_HELD = 200  # bytes that a message takes in memory beside its own
+_MESSAGE_OVERHEAD = 200  # bytes that a message takes in memory beside its own
 
 
 class McapFile:
@@ -183,7 +182,7 @@ class McapFile:
         """Yield the messages of a file without an index, in its order, up to a limit."""
         size = 0
         for message in self.messages():
-            size += len(message.raw) + _LEAST_HELD
+            size += len(message.raw) + _MESSAGE_OVERHEAD
             limits.check_size("a file without an index", size, limits.MOST_SORTED)
             yield message
         self._check_whole()
@@ -213,7 +212,7 @@ class McapFile:
                         yield StoredMessage(log_time_ns, published_ns, at, topic, raw, number)
                 elif kind in wanted:
                     yield from self._parse(kind, stream.read(length), begin)
-                elif kind in _UNKNOWN:
+                elif kind in _UNKNOWN_OPCODES:
                     self.unreadable["unknown record"] += 1
         except _CutOffError as error:
             self.unreadable[_CUT_OFF] += error.size
@@ -309,7 +308,7 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, int, int]]:
     """
     while size - (begin := stream.tell()) > _HEAD.size:
         kind, length = _HEAD.unpack(stream.read(_HEAD.size))
-        if (kind, length) in _ENDS:
+        if (kind, length) in _LAST_RECORDS:
             return
         end = begin + _HEAD.size + length
         if not kind or end > size:  # the format has no kind 0

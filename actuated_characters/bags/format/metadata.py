@@ -19,7 +19,7 @@ from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
-_OUTERMOST = "rosbag2_bagfile_information"
+_TOP_LEVEL_KEY = "rosbag2_bagfile_information"
 BAG = "bag"  # name of the bag in a run's directory
 EARLIER_BAG = BAG + "-earlier"  # older part of the bag while a recording of bounded size is made
 FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; MCAP's chunks say so themselves
@@ -29,7 +29,7 @@ _LATEST_VERSION = 9  # version that Jazzy writes
 class BagMetadata(NamedTuple):
     """The files and topics of a bag."""
 
-    files: tuple[Path, ...]  # in the order in which they were written
+    files: tuple[Path, ...]  # the files in the order of writing
     topics: tuple[str, ...]
     compression_mode: str  # FILE, MESSAGE or empty
     content: Mapping[str, Any]  # all of it
@@ -72,13 +72,13 @@ def load_metadata(bag: Path) -> Any:
         text = file.read(MOST_OF_METADATA + 1)
     place = f"{METADATA} is damaged"
     content = files.parse_yaml(place, text, RecordingError, most=MOST_OF_METADATA)
-    return content[_OUTERMOST]
+    return content[_TOP_LEVEL_KEY]
 
 
 def write_metadata(bag: Path, content: Mapping[str, Any]) -> None:
     """Write `metadata.yaml`, whole. Raises OSError."""
     scratch = bag / f"{METADATA}.tmp"
-    text = yaml.safe_dump({_OUTERMOST: dict(content)}, sort_keys=False)
+    text = yaml.safe_dump({_TOP_LEVEL_KEY: dict(content)}, sort_keys=False)
     scratch.write_text(text, encoding="utf-8")
     scratch.replace(bag / METADATA)
 

@@ -37,9 +37,9 @@ class StoredMessage(NamedTuple):
 
     log_time_ns: int
     published_ns: int | None  # wall time; None where the storage does not have it
-    place: tuple[int, int]  # where the message is in the file
+    place: tuple[int, int]  # says where the message is in the file
     topic: StoredTopic
-    raw: bytes  # as it is stored: rosbag2 may have compressed each message
+    raw: bytes  # the stored bytes: rosbag2 may have compressed each message
     number: int = 0  # its number among its channel's messages; 0 if it has none
 
 

@@ -18,8 +18,8 @@ from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from msgs_config.shared_parameters import PLANE
-from sim_node.physics.sphere_sweep import find_impact
-from sim_node.physics.throws import MOST_BALLS
+from sim_node.physics.balls.sphere_sweep import find_impact
+from sim_node.physics.balls.throws import MOST_BALLS
 
 SIDES: Mapping[str, float | None] = {
     "front": 0.0,
@@ -30,10 +30,10 @@ SIDES: Mapping[str, float | None] = {
 }
 """Angles in degrees about the vertical, counterclockwise from the way that the character faces."""
 
-_NEEDED = ("mass", "speed", "at", "target")
-_TEXTS = ("target", "from")
-_KEYS = (*_NEEDED, "from", "distance", "radius")
-_SLOWEST = 1e-3  # m/s
+_REQUIRED_KEYS = ("mass", "speed", "at", "target")
+_TEXT_KEYS = ("target", "from")
+_KEYS = (*_REQUIRED_KEYS, "from", "distance", "radius")
+_MIN_SPEED = 1e-3  # m/s
 _EXAMPLE = "mass=2 speed=8 at=2.0 from=left target=chest"
 
 
@@ -52,7 +52,7 @@ class ThrowRequest:
     speed: float  # m/s, along the straight way to the target
     at: float  # s since the first state: when it hits
     target: str  # a link
-    side: str = "front"  # of `SIDES`, or an angle as they have it, degrees
+    side: str = "front"  # one of `SIDES`, or an angle as they have it, degrees
     distance: float = 2.0  # m, from the link's centre of mass to where the ball is let go
     radius: float | None = None  # m; None: of a density that balls have
 
@@ -61,9 +61,9 @@ class ThrowRequest:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ConfigurationError(f"{name} is {value:g}; it must be above 0")
-        if self.speed < _SLOWEST:
+        if self.speed < _MIN_SPEED:
             raise ConfigurationError(
-                f"speed is {self.speed:g} m/s; it must be {_SLOWEST:g} m/s or more"
+                f"speed is {self.speed:g} m/s; it must be {_MIN_SPEED:g} m/s or more"
             )
 
     @property
@@ -88,13 +88,13 @@ def parse_throw(text: str) -> ThrowRequest:
         if key in given:
             raise ConfigurationError(f"'{key}' twice")
         given[key] = value
-    missing = [key for key in _NEEDED if key not in given]
+    missing = [key for key in _REQUIRED_KEYS if key not in given]
     if missing:
         raise ConfigurationError(f"'{missing[0]}' is missing; write it as '{_EXAMPLE}'")
     side = given.get("from", ThrowRequest.side)
     if side not in SIDES:
         _number("from", side, f"an angle in degrees, or one of {', '.join(SIDES)}")
-    numbers = {key: _number(key, value) for key, value in given.items() if key not in _TEXTS}
+    numbers = {key: _number(key, value) for key, value in given.items() if key not in _TEXT_KEYS}
     return ThrowRequest(target=given["target"], side=side, **numbers)
 
 

@@ -9,7 +9,7 @@ from controller_node.behaviours.state_machine.check import check_machine
 from controller_node.behaviours.state_machine.description import Machine
 from controller_node.behaviours.state_machine.effort_maker import EffortMaker
 from controller_node.behaviours.state_machine.file import read_machine
-from controller_node.behaviours.state_machine.leg import make_leg, standing_frames
+from controller_node.behaviours.state_machine.legs.leg import make_leg, standing_frames
 from controller_node.behaviours.state_machine.machine import MachineKit, StateMachine
 from controller_node.behaviours.state_machine.pose import PoseMaker
 from controller_node.control_laws import LawSettings

@@ -37,7 +37,7 @@ class Start:
     desired: Foreseen
     body: RolloutModel
     anchor: Anchor
-    perturbed: bool  # whether the character is: then its feet go where they catch it
+    perturbed: bool  # whether the character is pushed off: then its feet go where they catch it
 
 
 class PlanSearch:

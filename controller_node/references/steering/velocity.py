@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from msgs_config.settings import Settings, parameter
 
-_BACKWARD, _SIDEWAYS = 0.6, 0.3  # m/s, at most
+_BACKWARD, _SIDEWAYS = 0.6, 0.3  # largest speeds, m/s
 
 
 @dataclass(frozen=True)

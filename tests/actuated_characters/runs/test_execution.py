@@ -15,7 +15,7 @@ from rclpy.context import Context
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.processes import MODULES
 from msgs_config.character.loading import load_character

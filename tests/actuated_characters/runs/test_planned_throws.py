@@ -34,8 +34,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
+from sim_node.physics.balls.sphere_sweep import find_impact
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.sphere_sweep import find_impact
 from tests.support.physics import character
 from tests.support.runs import run_plan
 from tests.support.thrown_states import watch_states

@@ -14,8 +14,6 @@ from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
-from benchmarks.athletics.trial import Trial, moments
-from controller_node.behaviours.state_machine.file import read_machine
 from lecture.athletics.measures import longest_flight
 from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
@@ -72,25 +70,6 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
     assert labels == ["stand", "crouch", "thrust", "flight", "land", "rest"]
     assert not np.nan_to_num(recording.effort)[:, :6].any()
     assert replay([recording]).identical
-
-
-@pytest.mark.slow
-def test_a_trial_has_the_states_of_a_run() -> None:
-    """What the benchmarks and the search for parameters run is the product, to the bit."""
-    from actuated_characters.runs.bare_loop import ticks_in_process
-
-    trial = Trial(1.6, "0.5,0,0@0.1", ("root:60,0,0@1.1",))
-    machine = read_machine("walk")
-    plan = trial.plan(machine)
-    pushes = [parse_push(text, plan) for text in trial.pushes]
-
-    ticks = [tick.state for tick in ticks_in_process(plan, pushes)]
-    seen = list(moments(trial, machine, plan))
-
-    assert len(seen) == len(ticks) == 384
-    for moment, state in zip(seen, ticks, strict=True):
-        assert (moment.position == state.position).all()
-        assert (moment.velocity == state.velocity).all()
 
 
 def test_the_command_says_what_is_wrong_with_a_machine(processes: Processes) -> None:

@@ -9,7 +9,7 @@ import pytest
 from actuated_characters.cli import main
 from character_motion.bvh.reading import read_bvh
 from character_motion.clips.importing import ImportedClip, import_bvh
-from character_motion.retargeting import inverse_kinematics
+from character_motion.retargeting.optimisation import inverse_kinematics
 from character_motion.retargeting.target_body import TargetBody
 from controller_node.references.clip import ClipReference
 from msgs_config.arrays import FloatArray

@@ -110,7 +110,7 @@ def test_a_configuration_that_comes_just_before_a_first_state_counts_for_it(
     bench.publish_configuration(gravity=9.81)
     bench.publish_first_state(1)
     assert bench.until(lambda: bench.torques(1), "an answer") == expected(1, 9.81)
-    look, calls = Simulators.look, list[float]()
+    look, calls = Simulators.take_messages, list[float]()
 
     def look_just_before_a_reset(simulators: Simulators, now: float) -> None:
         look(simulators, now)
@@ -119,7 +119,7 @@ def test_a_configuration_that_comes_just_before_a_first_state_counts_for_it(
             bench.publish_configuration(MOON)
             bench.publish_first_state(9)
 
-    monkeypatch.setattr(Simulators, "look", look_just_before_a_reset)
+    monkeypatch.setattr(Simulators, "take_messages", look_just_before_a_reset)
     bench.until(lambda: calls, "the reset")
     bench.node.node.set_own_parameters({"gravity": MOON})
 

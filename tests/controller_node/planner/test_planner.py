@@ -17,7 +17,7 @@ import pytest
 from actuated_characters.bags.plans import decode_plan
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.metrics.recording_metrics import plan_errors
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.controller import Controller

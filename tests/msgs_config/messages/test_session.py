@@ -73,18 +73,18 @@ class Receiver:
         self.publishers = publishers
         self.binding = SessionBinding(given, lambda: self.publishers)
         self.now = 100.0
-        self.binding.look(self.now)
+        self.binding.note_look(self.now)
 
     def work(self, seconds: float) -> None:
         """Look for messages again and again, and find none."""
         for _ in range(round(seconds / TURN)):
             self.now += TURN
-            self.binding.look(self.now)
+            self.binding.note_look(self.now)
 
     def stand_still(self, seconds: float) -> None:
         """Do not look: the process is stopped."""
         self.now += seconds
-        self.binding.look(self.now)
+        self.binding.note_look(self.now)
 
     def hear(self, session: str) -> bool:
         """Hear a usable state; whether it was taken."""
