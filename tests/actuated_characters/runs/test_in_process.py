@@ -46,9 +46,8 @@ def steered_machine() -> PlannedRun:
 
 
 def planned_backflip() -> PlannedRun:
-    plan = make_plan(
-        "humanoid", 0.3, {"reference": "clip", "clip": "backflip"}, {}, {"planner": "predictive"}
-    )
+    quickly = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
+    plan = make_plan("humanoid", 0.3, {"reference": "clip", "clip": "backflip"}, {}, quickly)
     return PlannedRun(plan, (), (), (), ())
 
 

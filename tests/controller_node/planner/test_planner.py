@@ -391,9 +391,10 @@ def test_runs_that_are_planned_have_contacts_that_keep_their_points(
 
 
 @pytest.mark.slow
-def test_a_walk_goes_on_by_its_joints_alone() -> None:
+@pytest.mark.parametrize("duration", [0.6, pytest.param(1.2667, marks=pytest.mark.nightly)])
+def test_a_walk_goes_on_by_its_joints_alone(duration: float) -> None:
     settings = {"planner": "predictive"}
-    plan = make_plan("humanoid", 1.2667, {"reference": "clip", "clip": "walk"}, {}, settings)
+    plan = make_plan("humanoid", duration, {"reference": "clip", "clip": "walk"}, {}, settings)
     layout = HUMANOID.layout
 
     distances, turns = [], []
