@@ -21,11 +21,11 @@ from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
 from tests.support.runs import Run, run_plan, summary_of
 
-COMMANDS = "0.5,0,0.3@0.2 0,0,0@1.8"
+COMMANDS = "0.5,0,0.3@0.1 0,0,0@1.3"
 
 
 def planned() -> tuple[RunPlan, list[PlannedVelocity]]:
-    plan = make_plan("humanoid", 3.0, {}, {}, {"behaviour": "state_machine", "machine": "walk"})
+    plan = make_plan("humanoid", 2.0, {}, {}, {"behaviour": "state_machine", "machine": "walk"})
     return plan_velocities(plan, COMMANDS)
 
 
@@ -49,7 +49,7 @@ def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
     assert replay([recording]).identical
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     again = replay_states(sent, progress=lambda _: None, tell=lambda _: None)
-    assert again.identical and again.states == 721
+    assert again.identical and again.states == 481
 
 
 @pytest.mark.nightly
