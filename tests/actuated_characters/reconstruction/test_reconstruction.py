@@ -228,7 +228,7 @@ def test_the_number_of_processes_and_an_interruption_change_nothing(
     with pytest.raises(KeyboardInterrupt):
         reconstruct(replace(job(file), workers=2), interrupt)
     assert checkpoint_path(file).exists() and not file.exists()
-    reconstruct(replace(job(file), workers=2, resume=True))
+    reconstruct(replace(job(file), workers=1, resume=True))
 
     assert file.read_text() == kick[0].read_text()
     assert not checkpoint_path(file).exists()

@@ -152,7 +152,7 @@ def test_the_run_is_the_same_to_all_who_read_it(
     assert tables[0] == tables[1]
 
 
-@EACH_STORAGE
+@pytest.mark.parametrize("storage", ["mcap", pytest.param("sqlite3", marks=pytest.mark.nightly)])
 def test_players_in_the_place_of_either_node_get_the_same(
     runs: dict[str, Path], storage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
