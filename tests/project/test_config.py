@@ -286,6 +286,7 @@ def hash_in(directory: Path) -> str:
     return str(summary["state_hash"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", MOTIONS[:2])
 def test_the_nodes_of_a_file_have_the_states_of_a_run(
     processes: Processes, tmp_path: Path, file: str
@@ -326,6 +327,7 @@ def test_nodes_of_one_process_take_a_file_and_have_the_same_states(
     assert replay(read_recordings(tmp_path / "run")).state_hashes == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "turns", [1, *(pytest.param(turns, marks=pytest.mark.nightly) for turns in (0, 2))]
 )

@@ -228,6 +228,7 @@ def test_render_writes_a_strip_into_the_runs_directory(
     np.testing.assert_array_equal(read, strip(recording, 2, start=0.05, ghost=True, size=SIZE))
 
 
+@pytest.mark.slow
 def test_a_real_run_is_drawn_and_can_be_run_again(
     processes: Processes, tmp_path: Path, own_handlers: None
 ) -> None:
@@ -263,6 +264,7 @@ def test_render_writes_a_film_into_the_runs_directory(
     (run / "video.mp4").unlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
     run: Path, processes: Processes, tmp_path: Path, number: signal.Signals

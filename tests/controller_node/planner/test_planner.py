@@ -170,6 +170,7 @@ def test_nothing_is_found_where_all_comes_to_nothing() -> None:
     assert found.cost == np.inf
 
 
+@pytest.mark.slow
 def test_a_costly_plan_is_sought_for_longer() -> None:
     def plan_with(rounds: int, tolerance: float) -> Outlook:
         controller = a_controller(**{"plan.rounds": rounds, "plan.tolerance": tolerance})
@@ -190,6 +191,7 @@ def test_a_costly_plan_is_sought_for_longer() -> None:
 # Bits
 
 
+@pytest.mark.slow
 def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
     def walked(**given: object) -> str:
         return states_of(0.2, plan__rounds=2, plan__tolerance=0.0, **given)
