@@ -19,7 +19,7 @@ from controller_node.behaviours.state_machine.file import read_machine
 from lecture.athletics.measures import longest_flight
 from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
-from tests.support.runs import Run, run_plan, summary_of
+from tests.support.runs import Run, run_plan, run_plan_here, summary_of
 
 COMMANDS = "0.5,0,0.3@0.1 0,0,0@1.3"
 
@@ -30,25 +30,19 @@ def planned() -> tuple[RunPlan, list[PlannedVelocity]]:
 
 
 @pytest.mark.slow
-def test_a_run_over_topics_is_the_one_in_one_process_and_is_replayed_to_the_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_is_replayed_to_the_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan, velocities = planned()
     push = parse_push("root:60,0,0@1.1", plan)
-    alone, sent = tmp_path / "alone", tmp_path / "sent"
-    prepare_directory(alone, overwrite=False)
-    run_in_process(plan, alone, velocities=velocities, pushes=[push])
 
-    run_plan(plan, sent, velocities=velocities, pushes=[push])
+    run_plan_here(plan, tmp_path / "run", velocities=velocities, pushes=[push])
 
-    assert summary_of(sent)["state_hash"] == summary_of(alone)["state_hash"]
-    recording = read_recording(sent)
+    recording = read_recording(tmp_path / "run")
     assert recording.position[-1, 0] - recording.position[0, 0] > 0.2
     labels = [span.label for span in mode_spans(recording)]
     assert labels[:4] == ["stand, right", "shift, right", "step, right", "step, left"]
     assert replay([recording]).identical
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    again = replay_states(sent, progress=lambda _: None, tell=lambda _: None)
+    again = replay_states(tmp_path / "run", progress=lambda _: None, tell=lambda _: None)
     assert again.identical and again.states == 481
 
 
