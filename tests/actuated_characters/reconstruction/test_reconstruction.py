@@ -88,7 +88,7 @@ def test_other_processes_get_the_same_numbers_wherever_they_begin(world: TrialWo
 
 
 def test_what_a_process_did_that_was_killed_is_done_again(world: TrialWorld) -> None:
-    branches = [Branch(None, (seed,)) for seed in range(4)]
+    branches = [Branch(None, (seed,)) for seed in range(6)]
 
     with Workers(PROBLEM, WINDOW, 2) as workers:
         growing = workers.grow(branches)
