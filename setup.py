@@ -67,15 +67,12 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
-        # `planner: predictive` and `reconstruct`: numba compiles their rollouts (210 MB, BSD-2).
+        # `planner: predictive`, `motion reconstruct`: numba compiles rollouts (210 MB, BSD-2).
         "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
         # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
         "docs": ["furo>=2024.8", "myst-parser>=4,<6", "sphinx>=8,<9"],
-        # `python -m benchmarks.athletics.search`: parameters of state machines by CMA-ES (300 kB,
-        # BSD-3, pure Python).
-        "search": ["cma>=4,<5"],
         # Completion of the command line in bash and zsh (43 kB, Apache-2.0, pure Python).
         "completion": ["argcomplete>=3.5,<4"],
         # `view` and `run --view`: characters in a browser (50 MB with what it needs, MIT; the web
@@ -96,7 +93,6 @@ setup(
         "test": [
             "argcomplete>=3.5,<4",
             "av>=14,<19",
-            "cma>=4,<5",
             "furo>=2024.8",
             "gymnasium>=1.0,<2",
             "hypothesis>=6.98,<7",

@@ -16,7 +16,7 @@ from actuated_characters.given_arrays import (
     is_same_first,
     real_array,
 )
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import run_in_process
@@ -25,7 +25,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference
 from msgs_config.arrays import FloatArray
-from msgs_config.character.followers import check_undriven
+from msgs_config.character.joints.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
@@ -33,8 +33,9 @@ from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import as_values
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.physics import simulation
+from sim_node.physics.settings import SimulationSettings
 from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
@@ -132,7 +133,7 @@ class Controller:
         Raises:
             ActuatedCharactersError: the message is no state of the character.
         """
-        from msgs_config.messages.ros_state import effort_message, read_state
+        from msgs_config.bus.ros_state import effort_message, read_state
 
         layout = self.character.layout
         effort = self.compute_effort(read_state(layout, message))
@@ -219,7 +220,7 @@ class Simulation:
         return self._simulation.characters[0].state
 
     @property
-    def settings(self) -> simulation.SimulationSettings:
+    def settings(self) -> SimulationSettings:
         """What it depends on besides the character, where that begins, and the efforts."""
         return self._simulation.settings
 
@@ -286,7 +287,7 @@ class Simulation:
             np.concatenate(wrench)[np.newaxis],
             np.zeros((0, 3)),
             first_tick=self._simulation.tick,
-            ticks=make_node_settings(self._values).push_ticks,
+            ticks=NodeSettings.of(self._values).push_ticks,
         )
 
     def step(self, effort: FloatArray | Sequence[float]) -> StampedState:
@@ -335,7 +336,7 @@ class Simulation:
         return self.state
 
     @property
-    def _kind(self) -> tuple[tuple[str, ...], simulation.SimulationSettings]:
+    def _kind(self) -> tuple[tuple[str, ...], SimulationSettings]:
         """What another simulation's snapshot must have in common with this one."""
         return (self.character.file.name, *self.character.layout.dof_names), self.settings
 

@@ -8,9 +8,14 @@ from msgs_config.runtime.process import limit_threads, middleware_settings
 
 limit_threads()
 
-from benchmarks.support.needed import need  # noqa: E402 - after the limit on threads
+from msgs_config.errors import ConfigurationError  # noqa: E402 - after the limit on threads
+from msgs_config.extras import require_extra  # noqa: E402
 
-need("make bench", "plan", "view")
+try:
+    for extra in ("plan", "view"):
+        require_extra(extra, "make bench")
+except ConfigurationError as error:
+    sys.exit(f"error: {error}")
 
 from rich.console import Console  # noqa: E402
 
@@ -49,7 +54,8 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help="store the ratios as those to keep")
     options = parser.parse_args()
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    os.environ.update(middleware_settings(os.environ))  # as for its nodes, or it may not hear them
+    # Its nodes have them, too, or it may not hear them.
+    os.environ.update(middleware_settings(os.environ))
     console, ratios = Console(width=_WIDTH), []
     stored = read_ratios()  # before all that takes minutes: the file may be malformed
     with own_domain() as domain:

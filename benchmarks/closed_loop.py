@@ -1,6 +1,7 @@
 """The closed loop of simulator and controller: in one process, over topics, and composed."""
 
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -8,7 +9,9 @@ from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan
 from benchmarks.support.nodes import Nodes
 from msgs_config.arrays import FloatArray
-from msgs_config.messages import topics
+
+WALK: Mapping[str, object] = {"reference": "clip", "clip": "walk"}
+"""What a humanoid tracks that is measured."""
 
 
 def in_process(plan: RunPlan) -> FloatArray:
@@ -25,13 +28,6 @@ def over_topics(plan: RunPlan, *, composed: bool = False) -> list[dict[str, str]
     Its nodes have two processes, or one if they are `composed`.
     """
     with Nodes() as nodes:
-        if composed:
-            nodes.start_composed(plan.simulator, plan.controller)
-            nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)
-            return nodes.reports
-        nodes.start(topics.SIM_NODE, plan.simulator)
-        if not plan.simulator.integer("wait_for_subscribers"):
-            nodes.wait_until(lambda: nodes.reports)  # the simulator's reports are heard from now on
-        nodes.start(topics.CONTROLLER_NODE, plan.controller)
-        nodes.wait_until(lambda: nodes.reports and int(nodes.reports[-1]["tick"]) > plan.ticks)
+        nodes.start_loop(plan.simulator, plan.controller, composed=composed)
+        nodes.wait_until(lambda: nodes.tick > plan.ticks)
         return nodes.reports

@@ -5,12 +5,13 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 from rich.console import Console
-from rich.table import Table
 
 from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from benchmarks.closed_loop import WALK
 from benchmarks.support.deep_mimic import DeepMimicStablePd
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from controller_node.control_laws import LAWS
 from controller_node.parameters import make_controller
@@ -18,19 +19,17 @@ from controller_node.references.base import Reference, ReferenceState
 
 _DURATION = 5.0  # s of simulated time
 _ROUNDS = 7  # over all states; the best round counts, in which others disturbed the least
-_WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 _NEEDS_A_FILE = "feedforward"
 
 
 def measure_control_laws(console: Console) -> list[Ratio]:
     """Measure and print the table; the ratio of each law to PyBullet's."""
     console.print("control laws: humanoid ...")
-    ticks = list(ticks_in_process(make_plan("humanoid", _DURATION, _WALK, {}, {})))
+    ticks = list(ticks_in_process(make_plan("humanoid", _DURATION, WALK, {}, {})))
     with DeepMimicStablePd() as theirs:
         theirs_us = min(theirs.duration_us(ticks) for _ in range(_ROUNDS))
-    table = Table(title="one control law (µs a tick)", title_justify="left")
-    for column in ("", "law", "with reference", "law / PyBullet's"):
-        table.add_column(column, justify="right" if column else "left")
+    heading = ("", "law", "with reference", "law / PyBullet's")
+    table = make_table("one control law (µs a tick)", heading)
     ratios = []
     for name in LAWS:
         if name == _NEEDS_A_FILE:
@@ -56,7 +55,7 @@ class _CachedReference:
 
 def _ours(law: str, ticks: Sequence[Tick]) -> tuple[float, float]:
     """Durations in µs of an answer: with the desired states known before, and with all of it."""
-    plan = make_plan("humanoid", _DURATION, _WALK, {}, {"law": law})
+    plan = make_plan("humanoid", _DURATION, WALK, {}, {"law": law})
     first = ticks[0].state.stamp_ns
 
     def answers_us(reference: Reference) -> float:

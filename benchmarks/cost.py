@@ -11,11 +11,12 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.runs.plan import make_plan
-from benchmarks.closed_loop import in_process
+from benchmarks.closed_loop import WALK, in_process
 from benchmarks.support.chains import write_chain
 from benchmarks.support.nodes import Nodes
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
-from benchmarks.support.timed import timed
+from benchmarks.support.timing import timed
 from msgs_config.arrays import FloatArray
 from msgs_config.bus.dds import create_publisher
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
@@ -82,8 +83,7 @@ def cost_ratios(costs: list[Cost]) -> list[Ratio]:
 
 def _walking_us(console: Console) -> float:
     """Median duration in µs of the simulator's tick of a walk, without topics."""
-    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
-    plan = make_plan("humanoid", (_WARM_UP + _TICKS) / 240.0, reference, {}, {})
+    plan = make_plan("humanoid", (_WARM_UP + _TICKS) / 240.0, WALK, {}, {})
     with timed(Simulation, "step") as steps:
         in_process(plan)
     walking_us = 1e6 * float(np.median(steps[_WARM_UP:]))
@@ -171,11 +171,8 @@ class _LimpController:
 
 def _table(costs: list[Cost]) -> Table:
     title = "one tick of the simulator (median), and a DoF's share over that of the smallest"
-    table = Table(title=title, title_justify="left")
-    for column in ("", "DoF", "engine µs", "alone µs", "ticks/s", "µs/DoF", "ratio"):
-        table.add_column(column, justify="right" if column else "left")
-    for column in ("topics µs", "µs/DoF", "ratio"):
-        table.add_column(column, justify="right")
+    alone = ("DoF", "engine µs", "alone µs", "ticks/s", "µs/DoF", "ratio")
+    table = make_table(title, ("", *alone, "topics µs", "µs/DoF", "ratio"))
     first = costs[0]
     for cost in costs:
         row = [cost.label, str(cost.dofs), f"{cost.engine_us:.0f}", f"{cost.alone_us:.0f}"]

@@ -10,26 +10,23 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.runs.plan import RunPlan, make_plan
-from benchmarks.closed_loop import in_process, over_topics
+from benchmarks.closed_loop import WALK, in_process, over_topics
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.round_trip import round_trips
-from benchmarks.support.timed import timed
+from benchmarks.support.timing import timed
 from msgs_config.arrays import FloatArray
 from sim_node.physics.world import World
 
 _COUNT = 5000  # round trips
 _DURATION = 20.0  # s of simulated time
-_REFERENCES: dict[str, dict[str, object]] = {
-    "pendulum": {"reference": "hold"},
-    "humanoid": {"reference": "clip", "clip": "walk"},
-}
+_REFERENCES = {"pendulum": {"reference": "hold"}, "humanoid": WALK}
 
 
 def measure_lockstep(console: Console) -> list[Ratio]:
     """Measure and print the table; the ratios for each character."""
-    table = Table(title="lockstep, one tick (µs)", title_justify="left")
-    for column in ("", "p50", "p99", "ticks/s", "real-time factor"):
-        table.add_column(column, justify="right" if column else "left")
+    heading = ("", "p50", "p99", "ticks/s", "real-time factor")
+    table = make_table("lockstep, one tick (µs)", heading)
     ratios = []
     for name, reference in _REFERENCES.items():
         console.print(f"lockstep: {name} ...")
@@ -40,7 +37,7 @@ def measure_lockstep(console: Console) -> list[Ratio]:
 
 def _measure(plan: RunPlan, table: Table) -> list[Ratio]:
     """Add the rows of one character; the ratios of a tick over topics to what it is made of."""
-    name, rate = plan.character.name, plan.simulator.integer("rate")
+    name, rate = plan.character.name, plan.simulation.rate_hz
     layout = plan.character.layout
     with timed(World, "step") as steps:
         in_process(plan)

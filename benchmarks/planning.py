@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
+from benchmarks.closed_loop import WALK
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
-from benchmarks.support.yardstick import yardstick_us
+from benchmarks.support.timing import yardstick_us
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller_settings
 from controller_node.planner import settings as planner_settings
@@ -26,7 +27,6 @@ from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 _RATE = 240  # Hz
-_WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 _DURATION = 1.2  # s of the walk that is planned
 _MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9, 1.1)  # s of the walk from which it looks ahead
 _FORESEEN_SECONDS = (0.1, 0.3, 0.5)  # s
@@ -39,11 +39,10 @@ _ROUNDS = 5
 def measure_planning(console: Console) -> list[Ratio]:
     """Measure and print the tables; what a step and a simulated second cost."""
     console.print("planning ahead: humanoid, walk ...")
-    plan = make_plan("humanoid", _DURATION, _WALK, {}, {"planner": "predictive"})
+    plan = make_plan("humanoid", _DURATION, WALK, {}, {"planner": "predictive"})
     world = _World(plan)
-    table = Table(title="planning ahead", title_justify="left")
-    for column in ("threads", "thousand steps / s", "wall s / simulated s"):
-        table.add_column(column, justify="right")
+    heading = ("threads", "thousand steps / s", "wall s / simulated s")
+    table = make_table("planning ahead", heading)
     steps, ratios = {}, []
     for workers in (1, 2):
         steps[workers] = world.steps_a_second(workers)
@@ -53,9 +52,8 @@ def measure_planning(console: Console) -> list[Ratio]:
     ratios.append(Ratio("planning, a step", 1e6 / steps[1] / yardstick_us(), "step / yardstick"))
     how = "a step's time on two threads / half of that on one"
     ratios.append(Ratio("planning, 2 threads", 2.0 * steps[1] / steps[2], how))
-    foresight = Table(title="centre of mass foreseen, off the world's (m)", title_justify="left")
-    for column in ("after", "median", "largest"):
-        foresight.add_column(column, justify="right")
+    title = "centre of mass foreseen, off the world's (m)"
+    foresight = make_table(title, ("after", "median", "largest"))
     errors = np.array([world.errors(moment) for moment in _MOMENTS])
     for ahead, column in zip(_FORESEEN_SECONDS, errors.T, strict=True):
         foresight.add_row(f"{ahead:g} s", f"{np.median(column):.4f}", f"{column.max():.4f}")
@@ -66,7 +64,7 @@ def measure_planning(console: Console) -> list[Ratio]:
 def _wall_time(workers: int) -> float:
     """Wall seconds a simulated second of the walk in this process."""
     settings: dict[str, object] = {"planner": "predictive", "plan.workers": workers}
-    ticks = ticks_in_process(make_plan("humanoid", _DURATION, _WALK, {}, settings))
+    ticks = ticks_in_process(make_plan("humanoid", _DURATION, WALK, {}, settings))
     next(ticks)  # the first tick makes and compiles all, and its plan has many rounds
     started = time.perf_counter()
     count = sum(1 for _ in ticks)
@@ -83,7 +81,7 @@ class _World:
         self._plan = plan
         self._control = make_controller_settings(character, plan.controller)
         self._model = ContactModel(
-            character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.friction
+            character, period_s=1.0 / _RATE, gravity=9.81, friction=settings.parameters.friction
         )
         self._residual_model = ResidualModel(character, self._model, settings)
         self._body = self._model.body(self._control.gains)
@@ -91,7 +89,7 @@ class _World:
         self._knots = np.zeros((2, character.layout.size - 6))
 
     def steps_a_second(self, workers: int) -> float:
-        """RolloutPool' steps a wall second."""
+        """The rollouts' steps a wall second."""
         rollouts, start = RolloutPool(self._model, workers), self._desired(0.3)
         plans = np.repeat(self._knots[np.newaxis], _SAMPLES, axis=0)
         durations = []

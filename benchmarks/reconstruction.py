@@ -5,11 +5,11 @@ import time
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.table import Table
 
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.reconstruction.world import Branch
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 
 _WINDOW = 24  # ticks, 0.1 s
@@ -22,10 +22,8 @@ def measure_reconstruction(console: Console) -> list[Ratio]:
     console.print("reconstruction: humanoid, walk ...")
     counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
     times = [_window_time(count) for count in counts]
-    title = f"reconstruct --clip walk: a first window of 0.1 s of {_WORLDS} worlds, 240 Hz"
-    table = Table(title=title, title_justify="left")
-    for column in ("processes", "wall time, s", "parallel efficiency"):
-        table.add_column(column, justify="right")
+    title = f"motion reconstruct --clip walk: a first window of 0.1 s of {_WORLDS} worlds, 240 Hz"
+    table = make_table(title, ("processes", "wall time, s", "parallel efficiency"))
     for count, seconds in zip(counts, times, strict=True):
         table.add_row(str(count), f"{seconds:.1f}", f"{times[0] / (count * seconds):.2f}")
     console.print(table)

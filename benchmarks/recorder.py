@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from actuated_characters.runs.plan import RunPlan, make_plan
+from benchmarks.closed_loop import WALK
 from benchmarks.support.nodes import Nodes, processor_time
 from benchmarks.support.ratios import Ratio
 from msgs_config.messages import topics
@@ -20,7 +21,7 @@ _PAIRS = 5  # pairs of runs with and without a recorder
 
 
 @dataclass(frozen=True)
-class Timing:
+class RunTiming:
     """What one run took."""
 
     ticks_per_s: float
@@ -29,18 +30,16 @@ class Timing:
 
 def walk(duration: float) -> RunPlan:
     """The run that is measured: the humanoid's walk by stable PD, at 1 kHz."""
-    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
-    return make_plan(CHARACTER, duration, reference, {"rate": RATE}, {})
+    return make_plan(CHARACTER, duration, WALK, {"rate": RATE}, {})
 
 
 def _real_time() -> RunPlan:
     """The same messages in real time, of a ragdoll: late efforts cannot make it diverge."""
-    reference: dict[str, object] = {"reference": "clip", "clip": "walk"}
     simulator = {"rate": RATE, "mode": "realtime"}
-    return make_plan(CHARACTER, _REAL_TIME_DURATION, reference, simulator, {"law": "zero"})
+    return make_plan(CHARACTER, _REAL_TIME_DURATION, WALK, simulator, {"law": "zero"})
 
 
-def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
+def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> RunTiming:
     """Run simulator and controller as `run` does, with a recorder of everything or without."""
     with Nodes() as nodes, tempfile.TemporaryDirectory() as directory:
         recorder = None
@@ -48,30 +47,22 @@ def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> Timing:
             recorder = nodes.start(topics.RECORDER_NODE, {"directory": directory})
         listeners = {"wait_for_subscribers": 1 + recorded}
         simulator, controller = {**plan.simulator, **listeners}, {**plan.controller, **listeners}
-        if composed:
-            nodes.start_composed(simulator, controller)
-        else:
-            nodes.start(topics.CONTROLLER_NODE, controller)
-            nodes.start(topics.SIM_NODE, simulator)
-        nodes.wait_until(lambda: _tick(nodes) > 1)
-        first, began = _tick(nodes), time.monotonic()
+        nodes.start_loop(simulator, controller, composed=composed)
+        nodes.wait_until(lambda: nodes.tick > 1)
+        first, began = nodes.tick, time.monotonic()
         busy = processor_time(recorder) if recorder else 0.0
-        nodes.wait_until(lambda: _tick(nodes) > plan.ticks)
+        nodes.wait_until(lambda: nodes.tick > plan.ticks)
         taken = time.monotonic() - began
         used = processor_time(recorder) - busy if recorder else 0.0
-        return Timing((_tick(nodes) - first) / taken, used / taken)
-
-
-def _tick(nodes: Nodes) -> int:
-    return int(nodes.reports[-1]["tick"]) if nodes.reports else 0
+        return RunTiming((nodes.tick - first) / taken, used / taken)
 
 
 def measure_recorder(console: Console) -> list[Ratio]:
     """Measure and print the table; how much slower the loop is, and the recorder's share."""
     console.print(f"recorder: {CHARACTER} at {RATE} Hz, {_PAIRS} pairs of runs, two ways ...")
     plan = walk(_DURATION)
-    pairs: dict[bool, list[tuple[Timing, Timing]]] = {True: [], False: []}
-    for _ in range(_PAIRS):  # in turns: the machine may be busier at times
+    pairs: dict[bool, list[tuple[RunTiming, RunTiming]]] = {True: [], False: []}
+    for _ in range(_PAIRS):  # they take turns: the machine may be busier at times
         for composed, timings in pairs.items():
             without = time_run(plan, recorded=False, composed=composed)
             timings.append((without, time_run(plan, recorded=True, composed=composed)))
@@ -88,18 +79,19 @@ def measure_recorder(console: Console) -> list[Ratio]:
     label = f"in real time, {real_time.ticks_per_s:.0f} ticks a second"
     table.add_row(label, "", f"{real_time.share:.0%}")
     console.print(table)
+    how = "a tick beside it / one without it"
     return [
-        Ratio("recorder, slow-down", _median(ratios[False]), "a tick beside it / one without it"),
-        Ratio("recorder, slow-down, composed", _median(ratios[True]), "likewise, composed"),
+        Ratio("recorder, slow-down", _median(ratios[False]), how),
+        Ratio("recorder, slow-down, composed", _median(ratios[True]), how),
         Ratio("recorder, share", shares[False], "its processor time / the run's"),
     ]
 
 
-def _slow_downs(timings: list[tuple[Timing, Timing]]) -> list[float]:
+def _slow_downs(timings: list[tuple[RunTiming, RunTiming]]) -> list[float]:
     return [without.ticks_per_s / beside.ticks_per_s for without, beside in timings]
 
 
-def _ticks(timings: list[tuple[Timing, Timing]], which: int) -> str:
+def _ticks(timings: list[tuple[RunTiming, RunTiming]], which: int) -> str:
     return f"{_median([pair[which].ticks_per_s for pair in timings]):.0f}"
 
 

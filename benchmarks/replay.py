@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from actuated_characters.bags.recording import read_recordings
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.plan import make_plan
+from benchmarks.closed_loop import WALK
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
-from benchmarks.support.yardstick import yardstick_us
+from benchmarks.support.timing import yardstick_us
 from msgs_config.errors import ReplayError
 
 _DURATION = 20.0  # s of simulated time
-_WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 
 
 def measure_replay(console: Console) -> list[Ratio]:
@@ -31,7 +31,7 @@ def measure_replay(console: Console) -> list[Ratio]:
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder) / "run"
         prepare_directory(directory, overwrite=False)
-        plan = make_plan("humanoid", _DURATION, _WALK, {}, {})
+        plan = make_plan("humanoid", _DURATION, WALK, {}, {})
         run_over_topics(plan, directory, write_bag=True)
         times = [time.process_time()]
         recordings = read_recordings(directory)
@@ -40,9 +40,7 @@ def measure_replay(console: Console) -> list[Ratio]:
         times.append(time.process_time())
     if result.difference is not None:
         raise ReplayError(str(result.difference))
-    table = Table(title="replay of a walk, one core", title_justify="left")
-    for column in ("", "µs a tick", "real-time factor"):
-        table.add_column(column, justify="right" if column else "left")
+    table = make_table("replay of a walk, one core", ("", "µs a tick", "real-time factor"))
     reading, repeating = (1e6 * float(taken) / plan.ticks for taken in np.diff(times))
     for label, us in (
         ("reading the bag", reading),

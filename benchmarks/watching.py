@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.processes import Child
+from benchmarks.closed_loop import WALK
 from benchmarks.support.nodes import Nodes, processor_time
+from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from msgs_config.messages import topics
 from tests.support.browser import CHROMIUM, Browser
@@ -30,7 +31,7 @@ Watching = Callable[[], AbstractContextManager[PageClient | None]]
 
 
 @dataclass(frozen=True)
-class Timing:
+class WatchTiming:
     """What was measured between two reports of the simulator."""
 
     ticks_per_s: float
@@ -41,10 +42,9 @@ class Timing:
 def measure_watching(console: Console) -> list[Ratio]:
     """Measure and print the table; how much slower the loop is while it is watched."""
     title = f"watching, {_CHARACTER} in lockstep as fast as it goes, medians of {_PAIRS} pairs"
-    table = Table("", title=title, title_justify="left")
-    for heading in ("ticks/s", "watched", "slow-down", "pictures/s", "viewer's share of a core"):
-        table.add_column(heading, justify="right")
-    plan = make_plan(_CHARACTER, _DURATION, {"reference": "clip", "clip": "walk"}, {}, {})
+    heading = ("", "ticks/s", "watched", "slow-down", "pictures/s", "viewer's share of a core")
+    table = make_table(title, heading)
+    plan = make_plan(_CHARACTER, _DURATION, WALK, {}, {})
     ratios = []
     for label, composed in (("composed", True), ("two processes", False)):
         console.print(f"watching: {_CHARACTER}, {label} ...")
@@ -68,17 +68,14 @@ def measure_watching(console: Console) -> list[Ratio]:
     return ratios
 
 
-def _measure(plan: RunPlan, *, composed: bool) -> Iterator[tuple[str, list[tuple[Timing, Timing]]]]:
+def _measure(
+    plan: RunPlan, *, composed: bool
+) -> Iterator[tuple[str, list[tuple[WatchTiming, WatchTiming]]]]:
     """Pairs of times, not watched and watched, for each kind of page."""
     with Nodes() as nodes:
         viewer = nodes.start(topics.VIEWER_NODE, {"port": _PORT})
-        if composed:
-            nodes.start_composed(plan.simulator, plan.controller)
-        else:
-            nodes.start(topics.SIM_NODE, plan.simulator)
-            nodes.wait_until(lambda: nodes.reports)  # the simulator's reports are heard from now on
-            nodes.start(topics.CONTROLLER_NODE, plan.controller)
-        nodes.wait_until(lambda: _tick(nodes) > 1)
+        nodes.start_loop(plan.simulator, plan.controller, composed=composed)
+        nodes.wait_until(lambda: nodes.tick > 1)
         yield "headless client", _pairs(nodes, viewer, partial(_client, nodes))
         if CHROMIUM:
             yield "Chromium", _pairs(nodes, viewer, partial(_browser, nodes))
@@ -103,7 +100,9 @@ def _browser(nodes: Nodes) -> Iterator[None]:
         yield None
 
 
-def _pairs(nodes: Nodes, viewer: Child, watching: Watching) -> list[tuple[Timing, Timing]]:
+def _pairs(
+    nodes: Nodes, viewer: Child, watching: Watching
+) -> list[tuple[WatchTiming, WatchTiming]]:
     pairs = []
     for _ in range(_PAIRS):
         timings = []
@@ -114,26 +113,22 @@ def _pairs(nodes: Nodes, viewer: Child, watching: Watching) -> list[tuple[Timing
     return pairs
 
 
-def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> Timing:
+def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> WatchTiming:
     """Measure from the next report to the one some reports later."""
 
     def count() -> tuple[float, float, float, int]:
         known = len(nodes.reports)
         nodes.wait_until(lambda: len(nodes.reports) > known)
         pictures = page.pictures if page is not None else 0
-        return time.monotonic(), _tick(nodes), processor_time(viewer), pictures
+        return time.monotonic(), nodes.tick, processor_time(viewer), pictures
 
     first = count()
     for _ in range(_REPORTS):
         last = count()
     taken, ticks, busy, pictures = (b - a for a, b in zip(first, last, strict=True))
-    return Timing(ticks / taken, busy / taken, pictures / taken)
+    return WatchTiming(ticks / taken, busy / taken, pictures / taken)
 
 
-def _medians(timings: list[Timing]) -> Timing:
+def _medians(timings: list[WatchTiming]) -> WatchTiming:
     rows = [(each.ticks_per_s, each.share, each.pictures_per_s) for each in timings]
-    return Timing(*np.median(rows, axis=0).tolist())
-
-
-def _tick(nodes: Nodes) -> int:
-    return int(nodes.reports[-1]["tick"]) if nodes.reports else 0
+    return WatchTiming(*np.median(rows, axis=0).tolist())

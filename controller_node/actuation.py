@@ -4,7 +4,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.geometry import scalars
 
-_NOTHING = (0.0, 0.0, 0.0)
+_ZERO_VECTOR = (0.0, 0.0, 0.0)
 
 
 def describe_actuation(actuators: int, degrees_of_freedom: int) -> dict[str, int | bool]:
@@ -26,7 +26,7 @@ def net_wrench(
     and torque.
     """
     if not layout.has_floating_base:
-        return _NOTHING, _NOTHING
+        return _ZERO_VECTOR, _ZERO_VECTOR
     fx, fy, fz, *torque_in_base = effort[:6].tolist()
     turn = scalars.axes(scalars.exp(position[3:6].tolist()))
     return (fx, fy, fz), scalars.to_parent(turn, torque_in_base)

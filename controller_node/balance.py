@@ -15,6 +15,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, ShapeType
 from msgs_config.errors import CharacterError, one_of
 from msgs_config.geometry import fixed_order, rotations
+from msgs_config.settings import Settings, parameter
 
 _ROOT_ENTRIES = 6  # entries of the floating base, the first ones
 _LEAST_LOAD = 1.0  # N, the least load on both feet, where the law would have them pull
@@ -23,13 +24,19 @@ _FULL_FOOTING, _NO_FOOTING = 0.75, 0.5  # cosines of a sole's tilt: 41 and 60 de
 _LEAST_TIPPING = 1e-9  # N m^2, the least divisor, where the feet are in one place
 
 
-@dataclass(frozen=True)
-class BalanceGains:
+class BalanceGains(Settings, prefix="balance."):
     """How the centre of mass is held. The defaults suit the humanoid, 45 kg."""
 
-    stiffness: float = 1000.0  # N/m, horizontally, of the centre of mass to the feet's middle
-    damping: float = 600.0  # N s/m, of the centre of mass
-    friction: float = 0.3  # largest horizontal force, as a share of the vertical one
+    stiffness: float = parameter(
+        1000.0,
+        "horizontally, of the centre of mass to the middle of the feet",
+        unit="N/m",
+        live=True,
+    )
+    damping: float = parameter(600.0, "of the centre of mass", unit="N s/m", live=True)
+    friction: float = parameter(
+        0.3, "largest horizontal force on the feet, as a share of the vertical one", live=True
+    )
 
 
 _Sole = tuple[FloatArray, FloatArray, FloatArray, FloatArray]

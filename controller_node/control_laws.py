@@ -20,6 +20,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import ConfigurationError
+from msgs_config.settings import Settings, parameter
 
 # Equations
 
@@ -142,8 +143,8 @@ class LawContext:
 
     layout: JointLayout
     model: DynamicsModel
-    period: float  # s, of control
-    series: EffortSeries | None = None  # of the law `feedforward`
+    period: float  # control period, s
+    series: EffortSeries | None = None  # what the law `feedforward` plays
 
 
 class TrackingInput(NamedTuple):
@@ -153,7 +154,7 @@ class TrackingInput(NamedTuple):
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     now: ReferenceState
-    upcoming: ReferenceState  # one tick later
+    upcoming: ReferenceState  # desired one tick later
     offset: FloatArray | None = None  # (n,) of a planner, added to the errors
     effort: FloatArray | None = None  # (n,) of a behaviour, added to the law's
 
@@ -230,6 +231,19 @@ def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> Fl
 
 
 LAWS = tuple(sorted((*_LAWS.names, "pid")))
+
+
+class LawSettings(Settings):
+    """Which law it is, and of what."""
+
+    law: str = parameter("stable_pd", "the control law", choices=LAWS, live=True)
+    feedforward: str = parameter(
+        "",
+        "the law feedforward's CSV file: time_s and degrees of freedom's efforts",
+        at_reset=True,
+    )
+
+
 COMPENSATES_GRAVITY = ("computed_torque", "pd_gravity")
 """Laws whose efforts hold the character against its weight."""
 

@@ -40,7 +40,7 @@ from controller_node.strength import Strengths, StrengthSchedule
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MotionError
 from msgs_config.messages.clock import TickClock
@@ -95,7 +95,17 @@ class Controller:
         # Whether commanded velocities steer the reference.
         self.is_steered = isinstance(reference, SteeredReference)
         self._no_contacts = np.zeros((len(character.links), 6))
-        self.begin_episode(0)  # until a state says of which episode it is
+        self.begin_episode(0)  # the first state says of which episode it is
+
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """What it is made of, and does not change."""
+        return self._character, self._own_reference, self._choice, self._model
+
+    @property
+    def episode_ns(self) -> int:
+        """Stamp of the first state of the episode."""
+        return self._episode_ns
 
     def _enter_episode(self, episode_ns: int) -> None:
         """Begin the episode of a stamp, unless it has begun."""
@@ -272,6 +282,7 @@ class Controller:
 
     def _take(self, output: BehaviourOutput, stamp_ns: int) -> None:
         """Take a behaviour's phase and target from now on."""
+        # A phase or a target that goes on is the same object: a new one has begun in this tick.
         if self.mode is None or self.mode.phase is not output.phase:
             self.mode = ModeReport(output.phase, stamp_ns)
         if output.target is not self._tracked.target:

@@ -10,9 +10,19 @@ from controller_node.parameters import commanded_joints, make_controller, make_c
 from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.memory import MemoryFormat
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Parameter, Value, Values
+
+_PACKAGES = (
+    *("controller_node.balance", "controller_node.behaviours", "controller_node.control_laws"),
+    *("controller_node.controller", "controller_node.controller_settings"),
+    *("controller_node.effort_series", "controller_node.planner", "controller_node.references"),
+    *("controller_node.strength", "controller_node.tracked_reference"),
+    *("msgs_config.character", "msgs_config.geometry", "msgs_config.messages"),
+)
+"""Of what a controller consists, and its keyframes."""
 
 
 @dataclass
@@ -21,10 +31,11 @@ class ControllerSetup:
 
     values: Values
     controller: Controller
-    first_state: StampedState  # in which its reference begins
+    first_state: StampedState  # the state in which its reference begins
     drives_root: bool
     driven: IntArray  # the entries of the effort that it drives
     warnings: tuple[str, ...]
+    keyframe_format: MemoryFormat
 
 
 def make_setup(character: Character, values: Values) -> ControllerSetup:
@@ -43,6 +54,7 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
         drives_root=ROOT in joints,
         driven=np.flatnonzero(character.layout.mask(joints)),
         warnings=motion.warnings,
+        keyframe_format=MemoryFormat(_PACKAGES, *controller.parts),
     )
 
 
@@ -61,6 +73,17 @@ class ControllerSetups:
         self._character = character
         self._at_resets = [each.name for each in parameters if each.at_reset]
         self._may_drive_root = self.in_force.drives_root
+
+    def go_on(self, memory: bytes) -> None:
+        """Go on as the controller in a keyframe would, which had the same parameters.
+
+        Raises:
+            RecordingError: it had others, or is none of a controller.
+        """
+        controller = self.in_force.keyframe_format.read(memory)
+        if not isinstance(controller, Controller):
+            raise RecordingError("a keyframe cannot be used: it is none of a controller")
+        self.in_force.controller = controller
 
     def check(self, values: Values) -> ControllerSetup | None:
         """Check values; the controller of the next episode, None if it is the one in force.

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
@@ -10,21 +11,29 @@ from controller_node.controller import Controller
 from controller_node.controller_setups import ControllerSetups
 from controller_node.interface.answer_report import AnswerReport
 from controller_node.interface.awaited_messages import AwaitedMessages
-from controller_node.interface.publishers import Publishers, Reply
+from controller_node.interface.publishers import ControllerPublishers, Reply
 from controller_node.interface.simulator_check import check_simulator
 from controller_node.interface.simulators import Simulators
 from controller_node.interface.stamped_topics import StampedTopics
 from controller_node.interface.state_decoder import StateDecoder
-from controller_node.parameters import PARAMETERS, character_parameters, check_world
+from controller_node.parameters import (
+    PARAMETERS,
+    ControllerOptions,
+    character_parameters,
+    check_world,
+)
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
+from msgs_config.bus.keyframe_publisher import KeyframePublisher
 from msgs_config.bus.live_parameters import LiveParameters
 from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
+from msgs_config.bus.publishing import publish_together
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ClockError, LayoutError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
-from msgs_config.messages.session import ANONYMOUS, given_session
+from msgs_config.messages.keyframe import read_keyframe
+from msgs_config.messages.session import ANONYMOUS
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values, resolve
 from msgs_config.shared_parameters import DEFAULT_CHARACTER, collides, placed
@@ -52,6 +61,7 @@ class ControllerNode(ComposableNode):
         self._setups = ControllerSetups(self._character, declared, values)
         self._log_warnings(self._character.warnings)
         self._log_warnings(self._setups.in_force.warnings)
+        self._going_on = self._read_keyframe()
         self._last_reply: Reply | None = None
         self._published_first: StampedState | None = None
         self._is_answering = False
@@ -68,12 +78,21 @@ class ControllerNode(ComposableNode):
         for warning in warnings:
             self.node.get_logger().warning(warning)
 
+    def _read_keyframe(self) -> int:
+        """Go on from the keyframe that the parameters name; its stamp, 0 if they name none."""
+        path = ControllerOptions.of(self._values).keyframes.file
+        if not path:
+            return 0
+        keyframe = read_keyframe(path)
+        self._setups.go_on(keyframe.memory)
+        return keyframe.stamp_ns
+
     def _open_topics(self) -> None:
         controller, logger = self._controller, self._once_logger
         self._decoder = StateDecoder(self._layout, controller.clock)
         self._simulators = Simulators(
             self.node,
-            given_session(self._values),
+            ControllerOptions.of(self._values).session.id,
             controller.clock,
             lambda found: check_simulator(self._controller, self._character, self._values, found),
             logger,
@@ -84,10 +103,17 @@ class ControllerNode(ComposableNode):
         self._pending_state: bytes | None = None  # a state whose other messages are awaited
         # After all others: a simulator that has found this one has found the others as well.
         self._states = self.node.subscription(topics.JOINT_STATES)
-        self._outputs = Publishers(
+        self._outputs = ControllerPublishers(
             self.node, self._layout, self._setups.in_force.driven, self._simulators.bound
         )
         self._stamped_topics = StampedTopics(self.node, controller, self._outputs, logger)
+        self._keyframes = KeyframePublisher(
+            self.node,
+            topics.CONTROLLER_KEYFRAME.of(self.node.get_name()),
+            controller.clock,
+            ControllerOptions.of(self._values).keyframes.period,
+            at_once=bool(self._going_on),
+        )
         self._publish_configuration()
 
     @property
@@ -109,7 +135,7 @@ class ControllerNode(ComposableNode):
     def _publish_first_state(self) -> None:
         """Publish where the next episode's reference begins, if that is new."""
         first = self._setups.first_state
-        if first is not self._published_first:
+        if first is not self._published_first:  # each setup of an episode makes a new object
             self._published_first = first
             self._outputs.publish_initial_state(first)
 
@@ -132,7 +158,7 @@ class ControllerNode(ComposableNode):
     def _spin_once(self, executor: Executor) -> float:
         """Answer a state if there is one; the turn's result."""
         self._report.publish(self._other_counts)
-        self._simulators.look(time.monotonic())
+        self._simulators.take_messages(time.monotonic())
         raw = self._next_state()
         if raw is not None:
             executor.received()
@@ -200,6 +226,9 @@ class ControllerNode(ComposableNode):
     def _answer_state(
         self, raw: bytes, state: StampedState, episode_ns: int, surroundings: Surroundings
     ) -> None:
+        setup, session = self._setups.in_force, self._simulators.bound or ANONYMOUS
+        write = partial(setup.keyframe_format.write, setup.controller)
+        publish_together(self._keyframes.messages(state.stamp_ns, session, write))
         started = time.perf_counter()
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)
@@ -231,7 +260,7 @@ class ControllerNode(ComposableNode):
         """Whether all that are to hear the first answer are there; later ones wait for none."""
         if self._last_reply is not None:
             return True
-        wanted = self._values.integer("wait_for_subscribers")
+        wanted = ControllerOptions.of(self._values).wait_for_subscribers
         return self._outputs.torque_subscribers >= wanted
 
     def _check_rate(self, state: StampedState) -> None:
@@ -254,13 +283,16 @@ class ControllerNode(ComposableNode):
         from the latched topic, once.
         """
         if state.effort is None:
-            self._simulators.look(time.monotonic())  # a changed configuration came before the state
+            # A changed configuration came before the state.
+            self._simulators.take_messages(time.monotonic())
             if self._simulators.bound is None:
                 return None  # not the simulator that this controller was made for
             self._begin_episode(state.stamp_ns)
         elif self._episode_ns is None:
             found_ns = self._simulators.episode_before(state.stamp_ns)
-            if found_ns is not None:
+            if found_ns is not None and state.stamp_ns == self._going_on:
+                self._episode_ns = found_ns  # the controller is in it already
+            elif found_ns is not None:
                 self._begin_episode(found_ns)
         if self._episode_ns is None or self._episode_ns > state.stamp_ns:
             return None

@@ -7,92 +7,74 @@ from types import MappingProxyType
 import numpy as np
 
 from controller_node.balance import BalanceGains
-from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS, choose_behaviour
+from controller_node.behaviours.factory import (
+    BEHAVIOUR_PARAMETERS,
+    BehaviourSettings,
+    choose_behaviour,
+)
 from controller_node.behaviours.settings import check_terrain
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
-from controller_node.control_laws import LAWS, GainArrays
+from controller_node.control_laws import GainArrays, LawSettings
 from controller_node.controller import Controller
 from controller_node.controller_settings import ControllerSettings
 from controller_node.effort_series import read_effort_series
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner
-from controller_node.planner.settings import NO_PLANNER
+from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.base import Reference
 from controller_node.references.factory import MOTION_PARAMETERS
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
-from msgs_config.messages.session import SESSION
+from msgs_config.messages.session import GivenSession
 from msgs_config.parameters import Parameter, Values, resolve
-from msgs_config.shared_parameters import (
-    CHARACTER,
-    COLLISION,
-    COMMAND_DELAY,
-    GRAVITY,
-    PLACEMENT,
-    RATE,
-)
+from msgs_config.settings import Settings, parameter
+from msgs_config.shared_parameters import CharacterSource, KeyframeSettings, SharedSettings
 
 _ROOT_VECTORS = (ROOT, ROOT_TORQUE)
 
-PARAMETERS = [
-    CHARACTER,
-    COLLISION,
-    PLACEMENT,
-    RATE,
-    GRAVITY,
-    COMMAND_DELAY,
-    Parameter("law", "stable_pd", "the control law", choices=LAWS, live=True),
-    Parameter(
-        "feedforward",
-        "",
-        "the law feedforward's CSV file: time_s and degrees of freedom's efforts",
-        at_reset=True,
-    ),
-    *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
-    *planner_settings.PLANNER_PARAMETERS,
-    Parameter(
-        "root_assistance",
-        True,
-        "drive a floating base by the lecture's root force and torque",
-        at_reset=True,
-    ),
-    Parameter(
-        "wait_for_subscribers", 1, "answer when this many subscribe to joint_torques", maximum=1000
-    ),
-    Parameter(
-        "reference_velocity",
+
+class GainScale(Settings, prefix="gain_scale."):
+    """Factors on the gains of all joints."""
+
+    p: float = parameter(1.0, "factor on every joint's stiffness, not the root's", live=True)
+    d: float = parameter(1.0, "factor on every joint's damping, not the root's", live=True)
+
+
+class ControllerOptions(Settings):
+    """What the controller does around its law."""
+
+    root_assistance: bool = parameter(
+        True, "drive a floating base by the lecture's root force and torque", at_reset=True
+    )
+    wait_for_subscribers: int = parameter(
+        1, "answer when this many subscribe to joint_torques", maximum=1000
+    )
+    reference_velocity: str = parameter(
         "clip",
         "velocity to track: the reference's own, or zero as in the lecture's second form",
         choices=("clip", "zero"),
         live=True,
-    ),
-    Parameter(
-        "balance.enabled",
+    )
+    balance: bool = parameter(
         False,
         "add the virtual force that keeps it on its two feet to the law",
+        name="balance.enabled",
         live=True,
-    ),
-    Parameter(
-        "balance.stiffness",
-        BalanceGains.stiffness,
-        "horizontally, of the centre of mass to the middle of the feet",
-        unit="N/m",
-        live=True,
-    ),
-    Parameter(
-        "balance.damping", BalanceGains.damping, "of the centre of mass", unit="N s/m", live=True
-    ),
-    Parameter(
-        "balance.friction",
-        BalanceGains.friction,
-        "largest horizontal force on the feet, as a share of the vertical one",
-        live=True,
-    ),
-    SESSION,
-    Parameter("gain_scale.p", 1.0, "factor on every joint's stiffness, not the root's", live=True),
-    Parameter("gain_scale.d", 1.0, "factor on every joint's damping, not the root's", live=True),
-]
+    )
+    balance_gains: BalanceGains = BalanceGains()
+    keyframes: KeyframeSettings = KeyframeSettings()
+    session: GivenSession = GivenSession()
+    gain_scale: GainScale = GainScale()
 
+
+PARAMETERS = [
+    *CharacterSource.declared(),
+    *SharedSettings.declared(),
+    *LawSettings.declared(),
+    *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
+    *PlannerParameters.declared(),
+    *ControllerOptions.declared(),
+]
 
 _GAINS = {  # the end of a parameter's name: the field of `Gains`, its description, its unit
     "p": ("stiffness", "stiffness of '{}'", "N m/rad or N/m"),
@@ -156,7 +138,8 @@ def character_parameters(
 def make_gains(character: Character, values: Values) -> GainArrays:
     """The gains of the law, scaled, and the effort limits that the parameters' values say."""
     names, followers = character.vector_names, character.layout.followers
-    scales = {"p": values.number("gain_scale.p"), "d": values.number("gain_scale.d"), "i": 1.0}
+    scale = ControllerOptions.of(values).gain_scale
+    scales = {"p": scale.p, "d": scale.d, "i": 1.0}
     root = float(_assists(values))
     gains = {}
     for kind, (field, _, _) in _GAINS.items():
@@ -179,31 +162,25 @@ def make_controller_settings(character: Character, values: Values) -> Controller
         1.0 if name in undriven else values.number(f"strength.{name}")
         for name in character.vector_names
     ]
-    balance = None
-    if values.flag("balance.enabled") and not _is_ragdoll(values):
-        balance = BalanceGains(
-            stiffness=values.number("balance.stiffness"),
-            damping=values.number("balance.damping"),
-            friction=values.number("balance.friction"),
-        )
+    options, is_ragdoll = ControllerOptions.of(values), _is_ragdoll(values)
     return ControllerSettings(
-        law="zero" if _is_ragdoll(values) else values.text("law"),
+        law="zero" if is_ragdoll else LawSettings.of(values).law,
         gains=make_gains(character, values),
-        follows_velocity=values.text("reference_velocity") == "clip",
-        balance=balance,
+        follows_velocity=options.reference_velocity == "clip",
+        balance=options.balance_gains if options.balance and not is_ragdoll else None,
         strengths=np.array(strengths),
     )
 
 
 def _is_ragdoll(values: Values) -> bool:
-    return values.text("behaviour") == "ragdoll"
+    return BehaviourSettings.of(values).behaviour == "ragdoll"
 
 
 def _assists(values: Values) -> bool:
     """Whether the root is driven; not that of planned joint torques, and not by all behaviours."""
-    plans = values.text("planner") != NO_PLANNER
-    unassisted = values.text("behaviour") in ("ragdoll", STATE_MACHINE)
-    return values.flag("root_assistance") and not plans and not unassisted
+    plans = PlannerParameters.of(values).planner != NO_PLANNER
+    unassisted = BehaviourSettings.of(values).behaviour in ("ragdoll", STATE_MACHINE)
+    return ControllerOptions.of(values).root_assistance and not plans and not unassisted
 
 
 def make_controller(character: Character, reference: Reference, values: Values) -> Controller:
@@ -212,13 +189,13 @@ def make_controller(character: Character, reference: Reference, values: Values) 
     Raises:
         ActuatedCharactersError: a value is wrong, or a file or clip cannot be used.
     """
-    path = values.text("feedforward")
+    path, shared = LawSettings.of(values).feedforward, SharedSettings.of(values)
     return Controller(
         character,
         reference,
         make_controller_settings(character, values),
-        rate_hz=values.integer("rate"),
-        gravity=values.number("gravity"),
+        rate_hz=shared.rate,
+        gravity=shared.gravity,
         series=read_effort_series(character.layout, path) if path else None,
         behaviour=choose_behaviour(character, values),
         planner=make_planner(character, values),
@@ -230,7 +207,7 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
 
     A parameter that is not among the simulator's is taken as one that goes with them.
     """
-    check_terrain(values.text("behaviour"), simulator.get("terrain"))
+    check_terrain(BehaviourSettings.of(values).behaviour, simulator.get("terrain"))
     planner_settings.check_world(values, simulator)
 
 

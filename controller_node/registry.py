@@ -4,26 +4,27 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from msgs_config.parameters import Parameter
+from msgs_config.settings import Settings
 
 Maker = TypeVar("Maker")
 
 
 class Registry(Generic[Maker]):
-    """Functions by name, each with the parameters that it reads.
+    """Functions by name, each with the settings that it reads.
 
     A module registers its functions when it is imported, by
-    `@REFERENCES.register("step", *PARAMETERS)`.
+    `@REFERENCES.register("step", StepSettings)`.
     """
 
     def __init__(self) -> None:
         self._makers: dict[str, Maker] = {}
-        self._parameters: dict[str, tuple[Parameter, ...]] = {}
+        self._settings: dict[str, tuple[type[Settings], ...]] = {}
 
-    def register(self, name: str, *parameters: Parameter) -> Callable[[Maker], Maker]:
-        """Decorate the function of a name."""
+    def register(self, name: str, *settings: type[Settings]) -> Callable[[Maker], Maker]:
+        """Decorate the function of a name; what others read as well is declared by one of them."""
 
         def add(maker: Maker) -> Maker:
-            self._makers[name], self._parameters[name] = maker, parameters
+            self._makers[name], self._settings[name] = maker, settings
             return maker
 
         return add
@@ -40,4 +41,5 @@ class Registry(Generic[Maker]):
     @property
     def parameters(self) -> list[Parameter]:
         """The parameters of all, in the order of the names."""
-        return [parameter for name in self.names for parameter in self._parameters[name]]
+        settings = [each for name in self.names for each in self._settings[name]]
+        return [parameter for each in settings for parameter in each.declared()]

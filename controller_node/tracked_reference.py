@@ -31,11 +31,15 @@ class TrackedReference:
     ) -> None:
         """Begin with a reference; `episode_ns` is the stamp of the episode's first state."""
         self.follows_velocity = True  # the reference's; else the velocity to track is zero
-        self.target: Target | None = None  # of a behaviour, instead of the reference itself
+        self.target: Target | None = None  # a behaviour's, instead of the reference itself
         self._character, self._reference, self._clock = character, reference, clock
         self._together = _sampled_together(reference)  # None: it samples one state at a time
         self._first_tick = clock.first_tick_from(episode_ns)
         self._known_from, self._known = 0, list[TimedState]()  # a tick, the states from there on
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the states that are known: they are sampled again."""
+        return vars(self) | {"_known": []}
 
     def tick(self, stamp_ns: int) -> int:
         """Ticks from the episode's first state to the first tick from a stamp on."""

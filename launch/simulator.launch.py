@@ -1,66 +1,19 @@
 """The simulator alone; any node that answers its states moves the character."""
 
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
-from launch_ros.substitutions import FindPackageShare
+from launch import LaunchDescription
 
-PACKAGE = "actuated_characters"
-CONFIG = PathJoinSubstitution([FindPackageShare(PACKAGE), "config", LaunchConfiguration("config")])
-OVERRIDES = ("character", "initial_state", "max_ticks", "wait_for_subscribers")
-"""Parameters that arguments of the same names set, instead of the config."""
+from actuated_characters import launching
+
+PARAMETERS = ("character", "initial_state", "max_ticks", "wait_for_subscribers")
 
 
 def generate_launch_description() -> LaunchDescription:
     """The node and its arguments."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "config",
-                default_value="humanoid_walk.yaml",
-                description="parameter file: the name of one that ships, or an absolute path",
-            ),
-            DeclareLaunchArgument(
-                "character",
-                default_value="",
-                description="name of a character, or path of its .yaml file; empty: the config's",
-            ),
-            DeclareLaunchArgument(
-                "initial_state",
-                default_value="",
-                description="given, without controller_node, or reference; empty: the config's",
-            ),
-            DeclareLaunchArgument(
-                "max_ticks",
-                default_value="",
-                description="end after this many ticks; 0: never; empty: as in the config",
-            ),
-            DeclareLaunchArgument(
-                "wait_for_subscribers",
-                default_value="",
-                description="begin when so many listen to a node; empty: as in the config",
-            ),
-            DeclareLaunchArgument(
-                "namespace", default_value="", description="namespace of nodes and topics"
-            ),
-            OpaqueFunction(function=_start),
+            launching.declare_config(),
+            launching.declare_namespace(),
+            *launching.declare_parameters(*PARAMETERS),
+            launching.start("sim_node", *PARAMETERS),
         ]
     )
-
-
-def _start(context: LaunchContext) -> list[Node]:
-    arguments = {name: LaunchConfiguration(name) for name in OVERRIDES}
-    return [
-        Node(
-            package=PACKAGE,
-            executable="sim_node",
-            name="sim_node",
-            namespace=LaunchConfiguration("namespace"),
-            # not among `parameters`, where a file that does not exist is no error
-            ros_arguments=["--params-file", CONFIG],
-            parameters=[{name: it for name, it in arguments.items() if it.perform(context)}],
-            output="screen",
-            on_exit=Shutdown(reason="the simulator has ended"),
-        )
-    ]

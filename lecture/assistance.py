@@ -24,7 +24,7 @@ RUNS = 7
 _CHARACTER = "humanoid"
 _STRENGTHS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.0)  # factors of root force and torque
 _DURATION = 5.0  # s
-_SMALLEST = 0.003  # where no assistance is drawn on an axis that has no zero
+_SMALLEST_DRAWN = 0.003  # no assistance is drawn here on an axis that has no zero
 _PICTURES, _SIZE = 8, (190, 240)
 
 
@@ -91,7 +91,7 @@ def _draw(result: StudyResult, runs: Mapping[str, Recording]) -> None:
     title = "the walk needs a force that no motor gives"
     panels = result.add_panels(result.name, 2, 2, (12.0, 7.5), title=title)
     falls, errors, forces, heights = panels
-    strengths = [max(strength, _SMALLEST) for strength in _STRENGTHS]
+    strengths = [max(strength, _SMALLEST_DRAWN) for strength in _STRENGTHS]
     columns = {name: result.column(name)[:-1] for name in result.columns}
     times = columns["falls at (s)"]
     for time, place in zip(times, strengths, strict=True):

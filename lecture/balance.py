@@ -22,11 +22,11 @@ RUNS = 30
 
 _RATE = 240  # Hz
 _PUSH_TIME, _PUSH_DURATION = 1.0, 0.1  # s
-_PUSHED, _STANDING = 6.0, 60.0  # s, length of the runs
+_PUSHED_TIME, _STANDING_TIME = 6.0, 60.0  # s, length of the runs
 _LINK = "chest"
 _MAX_IMPULSE, _IMPULSE_RESOLUTION = 32.0, 0.5  # N s
-_STANDS = 0.8  # share of the height at the beginning
-_UPRIGHT = 0.7  # cosine of the trunk's tilt
+_STANDING_HEIGHT = 0.8  # share of the height at the beginning
+_UPRIGHT_COSINE = 0.7  # cosine of the trunk's tilt
 _DIRECTIONS = {
     "forward": (1.0, 0.0),
     "backward": (-1.0, 0.0),
@@ -56,8 +56,8 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
 
     By joint efforts alone.
     """
-    stood = runner.run(_case("stand", _STANDING)).recording
-    limp = runner.run(_case("without", _PUSHED, {"balance.enabled": False})).recording
+    stood = runner.run(_case("stand", _STANDING_TIME)).recording
+    limp = runner.run(_case("without", _PUSHED_TIME, {"balance.enabled": False})).recording
     limits = {name: _largest_impulse(runner, name) for name in _DIRECTIONS}
     result.rows += [
         {
@@ -71,7 +71,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw(result, stood, limp, limits)
     _draw_poses(result, limp, limits["forward"])
     result.remarks.append(
-        f"with the virtual force it stands {standing_time(stood):.4g} s of {_STANDING:g} s; "
+        f"with the virtual force it stands {standing_time(stood):.4g} s of {_STANDING_TIME:g} s; "
         f"by stable PD alone {standing_time(limp):.3g} s"
     )
 
@@ -79,7 +79,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
 def stands(recording: Recording) -> BoolArray:
     """In which states (t + 1,) the root is not lower than 0.8 of its height at the beginning."""
     height = recording.position[:, 2]
-    standing: BoolArray = height > _STANDS * height[0]
+    standing: BoolArray = height > _STANDING_HEIGHT * height[0]
     return standing
 
 
@@ -88,7 +88,7 @@ def is_upright(recording: Recording) -> bool:
     first, last = rotations.exp(recording.position[[0, -1], 3:6])
     up = np.array((0.0, 0.0, 1.0))
     own_up = rotations.rotate(rotations.conjugate(first), up)
-    return bool(rotations.rotate(last, own_up)[2] > _UPRIGHT)
+    return bool(rotations.rotate(last, own_up)[2] > _UPRIGHT_COSINE)
 
 
 def standing_time(recording: Recording) -> float:
@@ -128,7 +128,7 @@ def _largest_impulse(runner: StudyRunner, direction: str) -> _Limit:
 
     def pushed(impulse: float) -> RunResult:
         label = f"{direction}_{impulse:g}Ns"
-        return runner.run(_case(label, _PUSHED, impulse=(impulse * x, impulse * y)))
+        return runner.run(_case(label, _PUSHED_TIME, impulse=(impulse * x, impulse * y)))
 
     low, high, strongest = 0.0, _MAX_IMPULSE, None
     while high - low > _IMPULSE_RESOLUTION:

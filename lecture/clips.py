@@ -29,7 +29,12 @@ _BOUNDS = {"walk": 0.08, "punch": 0.25}  # rad, bounds of the mean joint error
 _BOUND = 0.12  # rad, bound of the mean joint error of the other clips
 _TOUCH = 0.01  # m above the ground, below which a link of the capture is on it
 _EACH = 4  # every fourth state is looked at for what is on the ground
-_PICTURED = {"walk": 1.3, "backflip": 1.75, "cartwheel": 2.72, "punch": 2.2}  # s from the start
+_PICTURED_SECONDS = {
+    "walk": 1.3,
+    "backflip": 1.75,
+    "cartwheel": 2.72,
+    "punch": 2.2,
+}  # s from the start
 _PICTURES, _SIZE = 8, (190, 240)
 
 
@@ -128,9 +133,10 @@ def _draw_poses(result: StudyResult, recordings: Mapping[str, Recording]) -> Non
     """Poses of some clips over one cycle, the capture as a ghost."""
     pictures = {}
     for clip, recording in recordings.items():
-        if clip not in _PICTURED:
+        if clip not in _PICTURED_SECONDS:
             continue
-        last = min(_PICTURED[clip], float(recording.times[-2]))  # the last state has no ghost
+        end = float(recording.times[-2])  # the last state has no ghost
+        last = min(_PICTURED_SECONDS[clip], end)
         times = np.linspace(0.0, last, _PICTURES).tolist()
         picture = strip(recording, times, ghost=True, size=_SIZE)
         pictures[f"{clip}; the capture in green"] = picture

@@ -22,7 +22,7 @@ TITLE = "tracking of the walk by control rate and delay, with root assistance"
 RUNS = 16
 
 _CHARACTER = "humanoid"
-_RATES = (120, 240, 480, 960)  # Hz, of control
+_RATES = (120, 240, 480, 960)  # control rates, Hz
 _DELAYS = (0, 1, 2, 4)  # ticks
 _ENGINE_RATE = 960  # Hz; the same for all, so that nothing differs but control
 _DURATION = 3.0  # s

@@ -27,7 +27,7 @@ _CASES = (
     RunSpec("fall", "humanoid", _DURATION, controller={"root_assistance": False}, contacts=True),
 )
 
-_SMALLEST = 1e-17  # least value that a logarithmic axis shows
+_SMALLEST_DRAWN = 1e-17  # least value that a logarithmic axis shows
 _PARTS = ("M (v' - v) / h", "C", "f", "J^T contacts")
 
 
@@ -112,8 +112,8 @@ def _time_parts(walk: RunResult) -> dict[str, float]:
 def _draw(result: StudyResult, closures: Mapping[str, Closure], times: Mapping[str, float]) -> None:
     residuals, norms, bars = result.add_panels(result.name, 3, 1, (10.0, 9.0))
     for name, closure in closures.items():
-        relative = np.maximum(closure.relative, _SMALLEST)
-        without = np.maximum(closure.without_contacts, _SMALLEST)
+        relative = np.maximum(closure.relative, _SMALLEST_DRAWN)
+        without = np.maximum(closure.without_contacts, _SMALLEST_DRAWN)
         (line,) = residuals.semilogy(closure.times, relative, linewidth=0.8, label=name)
         style, left_out = (
             {"color": line.get_color(), "linewidth": 0.8},

@@ -32,11 +32,12 @@ _DURATION = 4.0  # s
 _SIMULATOR = {"rate": _RATE, "wrench_duration": _PUSH_DURATION}
 _SINE = {"reference": "sine", "sine.amplitude": 0.3, "sine.frequency": 0.5}
 _ARM_LAW, _WALK_LAW = {"law": "computed_torque"}, {"law": "stable_pd"}
-_CLOSED = {  # loops, by the link that is pushed
+_CLOSED_LOOPS = {  # loops, by the link that is pushed
     "lbr_iiwa_link_7": RunSpec("kuka-closed", "kuka", _DURATION, _SINE, _SIMULATOR, _ARM_LAW),
     "chest": RunSpec("humanoid-closed", "humanoid", _DURATION, WALK, _SIMULATOR, _WALK_LAW),
 }
-_STYLES: Mapping[tuple[str, bool], dict[str, Any]] = {  # by loop, and whether it is pushed
+# Styles by loop, and by whether it is pushed.
+_STYLES: Mapping[tuple[str, bool], dict[str, Any]] = {
     ("closed", False): {"color": "tab:blue", "linewidth": 5.0, "alpha": 0.35},
     ("open", False): {"color": "black", "linestyle": ":", "linewidth": 1.5},
     ("closed", True): {"color": "tab:blue", "linewidth": 1.2},
@@ -50,7 +51,9 @@ _Quartet = Mapping[tuple[str, bool], RunResult]
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
     """Four runs of an arm and of a walk."""
-    quartets = {case.character: _run_loops(runner, case, link) for link, case in _CLOSED.items()}
+    quartets = {
+        case.character: _run_loops(runner, case, link) for link, case in _CLOSED_LOOPS.items()
+    }
     for character, quartet in quartets.items():
         result.rows += [_row(character, *key, quartet) for key in quartet]
         curves = {"time_s": quartet["closed", False].recording.times[:-1]}

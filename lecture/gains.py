@@ -22,7 +22,7 @@ RUNS = 10
 
 _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
-_SETTLED = 0.5  # s; the time before is the start
+_MEASURED_SINCE = 0.5  # s; the time before is the start
 _LONGEST_LAG = 0.4  # s
 _SHOWN_SECONDS = 3.0  # s
 _FACTORS = {  # factors of stiffness and damping; the lecture's two rows of three pictures
@@ -35,7 +35,7 @@ _FACTORS = {  # factors of stiffness and damping; the lecture's two rows of thre
 }
 _VELOCITIES = {"clip": "with reference velocity", "zero": "without"}
 _PICTURES, _SIZE = 10, (180, 230)
-_PICTURED = (1.27, 2.54)  # s, the second cycle
+_PICTURED_SPAN = (1.27, 2.54)  # s, the second cycle
 
 
 _Runs = Mapping[tuple[tuple[float, float], str], RunResult]
@@ -103,7 +103,7 @@ def _row(name: str, velocity: str, outcome: RunResult) -> Row:
     run, overshoots, late, expected = outcome.recording, None, None, None
     if not outcome.diverged:
         knee = _knee(run, _FACTORS[name])
-        _, angle, reference, theory = knee[:, knee[0] >= _SETTLED]
+        _, angle, reference, theory = knee[:, knee[0] >= _MEASURED_SINCE]
         overshoots = overshoot(angle, reference)
         late, expected = (
             1e3 * lag(values, reference, 1.0 / _RATE, _LONGEST_LAG) for values in (angle, theory)
@@ -153,7 +153,9 @@ def _draw_poses(result: StudyResult, runs: _Runs) -> None:
     for name, factors in _FACTORS.items():
         run = runs[factors, "clip"].recording
         end = float(run.times[-2])
-        times = np.linspace(min(_PICTURED[0], end), min(_PICTURED[1], end), _PICTURES).tolist()
+        times = np.linspace(
+            min(_PICTURED_SPAN[0], end), min(_PICTURED_SPAN[1], end), _PICTURES
+        ).tolist()
         pictures[f"{name}, with reference velocity; the reference in green"] = strip(
             run, times, columns=_PICTURES, ghost=True, size=_SIZE
         )

@@ -29,7 +29,7 @@ RUNS = 5
 
 _RATE, _FINE_RATE = 240, 1920  # Hz
 _DURATION = 2.0  # s
-_SMALLEST = 1e-18  # what is drawn where there is nothing
+_SMALLEST_DRAWN = 1e-18  # what is drawn where there is nothing
 _TORQUE = 0.15  # N m, the largest torque
 _FORCE = 0.5  # N, of the root in the run with assistance
 _PARENT = Box("parent", 2.0, (0.15, 0.1, 0.6), (0.0, 0.0, 0.3))
@@ -98,7 +98,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     hinge.plot(times, by_forces.hinge, "k--", label="by 3 pairs of forces")
     hinge.plot(times, passive.hinge, color="tab:gray", label="by neither")
     label(hinge, "time (s)", "angle of the hinge (rad)", "the same motion: τ = Σ r × f, Σ f = 0")
-    difference.semilogy(times, np.maximum(apart, _SMALLEST), label="largest entry")
+    difference.semilogy(times, np.maximum(apart, _SMALLEST_DRAWN), label="largest entry")
     label(difference, "time (s)", "position apart (rad, m)", "the two runs differ by rounding")
     _draw_momentum(others, by_torque, at_fine_rate, by_root)
     curves = {"hinge_by_torque_rad": by_torque.hinge, "hinge_by_forces_rad": by_forces.hinge}
@@ -177,8 +177,10 @@ def balanced_pushes(recording: Recording, torques: FloatArray) -> list[PlannedPu
     pushes = []
     for tick, torque in enumerate(torques.tolist()):
         position = recording.position[tick]
-        turn = rotations.matrix(rotations.exp(position[3:6]))  # of the parent, in the world
-        bend = rotations.matrix(rotations.exp(position[6] * axis))  # of the child, in the parent
+        # Turns the parent's axes into the world's.
+        turn = rotations.matrix(rotations.exp(position[3:6]))
+        # Turns the child's axes into the parent's.
+        bend = rotations.matrix(rotations.exp(position[6] * axis))
         stamp = int(recording.stamps_ns[tick])
         for point, force in zip(_POINTS, torque * unit, strict=True):
             in_world = turn @ bend @ force
@@ -219,7 +221,7 @@ def _draw_momentum(
         (by_root, f"and a root force, {_FINE_RATE} Hz", "tab:green"),
     ):
         clock, (linear, angular) = run.recording.times, run.changes
-        centre.semilogy(clock, np.maximum(run.off_line, _SMALLEST), color=color, label=name)
+        centre.semilogy(clock, np.maximum(run.off_line, _SMALLEST_DRAWN), color=color, label=name)
         momentum.plot(clock, linear, color=color, label=f"P, {name}")
         momentum.plot(clock, angular, ":", color=color, label=f"L, {name}")
     centre.semilogy(times[1:], 0.5 * _FORCE / mass * times[1:] ** 2, label="f t² / 2 m", **THEORY)

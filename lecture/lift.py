@@ -19,7 +19,7 @@ from lecture.theory.lift_responses import (
     TARGET,
     WEIGHT,
     Bound,
-    LawGains,
+    LiftLaw,
     Response,
     find_bound,
 )
@@ -35,7 +35,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     """Run each law with typical gains, then look for the bounds of stability."""
 
     def respond(law: str, kp: float = STIFFNESS, kd: float = CRITICAL, ki: float = 0.0) -> Response:
-        return _respond(runner, LawGains(law, kp, kd, ki), _LENGTH)
+        return _respond(runner, LiftLaw(law, kp, kd, ki), _LENGTH)
 
     p = respond("p", kd=0.0)
     pd = [respond("pd", kd=kd) for kd in (4.0, CRITICAL, 60.0)]
@@ -43,7 +43,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     gravity = respond("pd_gravity")
     pid = [respond("pid", ki=share * _LIMIT) for share in (0.1, 0.8, 1.2)]
     stiff = [
-        _respond(runner, LawGains.critical(law, kp), _LENGTH)
+        _respond(runner, LiftLaw.critical(law, kp), _LENGTH)
         for law, kp in (("pd", 25.0), ("pd", 400.0), ("pd", 1600.0), ("stable_pd", 400.0))
     ]
     bounds = [
@@ -69,7 +69,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _add_notes(result, *bounds)
 
 
-def _respond(runner: StudyRunner, gains: LawGains, duration: float) -> Response:
+def _respond(runner: StudyRunner, gains: LiftLaw, duration: float) -> Response:
     numbers = f"{gains.stiffness:.0f}-{gains.damping:.0f}-{gains.integral:.0f}"
     controller = {
         "law": gains.law,
@@ -112,7 +112,7 @@ def _yes(is_so: bool) -> str:
     return "yes" if is_so else "no"
 
 
-def _curve_name(gains: LawGains) -> str:
+def _curve_name(gains: LiftLaw) -> str:
     return f"{gains.law}_kp{gains.stiffness:g}_kd{gains.damping:g}_ki{gains.integral:g}_m"
 
 

@@ -1,14 +1,14 @@
 """A character that is hit by balls: how far it gives way, and how it comes back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.stills import strip
 from actuated_characters.report.charts import Marks
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import Event, mode_events, throw_events
 from lecture.framework.result import Row, StudyResult
 from lecture.framework.study import WALK, RunSpec, StudyRunner
 from lecture.framework.tracking import joint_errors
@@ -23,11 +23,11 @@ HIT = 1.0  # s
 _SPEED = 8.0  # m/s
 _LENGTH, _LONG = 4.0, 8.0  # s, of the runs; of those that fall and get up
 _RAGDOLL_HIT = 0.15  # s: later it is out of the ball's way
-_AROUND = 0.05  # s before and after the hit between which the ball's momentum is compared
+_MOMENTUM_SPAN = 0.05  # s before and after the hit between which the ball's momentum is compared
 _AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
 _MODES = ("REACT", "BLEND", "LIMP")
-_POSES = {  # for each run: what is seen, and when, s
+_POSES = {  # what is seen of each run, and when, s
     "ragdoll": (
         "ragdoll, 40 N s: no torque but that of the soft limits, no assistance",
         (0.0, 0.1, 0.15, 0.25, 0.4, 0.6, 0.9, 3.0),
@@ -91,9 +91,9 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
 
 
 def _row(planned: float, reaction: HitEffects, run: Recording) -> Row:
-    spans = mode_spans(run)
+    modes = mode_events(run)
     lasting = {
-        f"{mode} (s)": sum((span.duration for span in spans if span.mode == mode), start=0.0)
+        f"{mode} (s)": sum((each.duration for each in modes if each.label == mode), start=0.0)
         for mode in _MODES
     }
     return {
@@ -135,7 +135,7 @@ def measure(run: Recording, alone: Recording, hit: float) -> HitEffects:
 
 def lost_momentum(run: Recording, hit: float) -> float:
     """Momentum in N s that the only ball has lost around a time in s, without gravity's part."""
-    before, after = np.searchsorted(run.times, (hit - _AROUND, hit + _AROUND))
+    before, after = np.searchsorted(run.times, (hit - _MOMENTUM_SPAN, hit + _MOMENTUM_SPAN))
     motions = [run.balls[row] for row in (before, after)]
     (throw,) = [throw for each in run.throws for throw in each]
     if any(motion is None for motion in motions):
@@ -175,17 +175,14 @@ def _draw(
     """Two panels an impulse: the root's displacement and the joint error, and the modes."""
     title = "hit against the chest at 1 s; the assistance is full in TRACK and BLEND"
     panels = result.add_panels(result.name, len(hits), 2, (11.0, 9.0), title=title, same_x="row")
-    marks, modes = Marks(), list[tuple[float, float, str]]()  # those of all hits, for the legend
+    events: list[Event] = []  # those of all hits, for the legend
     usual = joint_errors(alone, alone.reference_position).mean(axis=1)
     for (impulse, run), (moved, error) in zip(
         hits.items(), zip(panels[::2], panels[1::2], strict=True), strict=True
     ):
         reaction = reactions[impulse]
-        marks = Marks(
-            throws=[float(run.times[tick]) for tick, each in enumerate(run.throws) if each],
-            modes=[(span.start, span.duration, span.mode) for span in mode_spans(run)],
-        )
-        modes += marks.modes
+        marks = Marks([*throw_events(run), *mode_events(run)])
+        events += marks.events
         moved.plot(run.times, reaction.displacement)
         moved.set_ylabel("root moved (m)")
         moved.set_title(f"{impulse:g} N s", fontsize="medium", loc="left")
@@ -199,4 +196,4 @@ def _draw(
     for panel in panels[-2:]:
         panel.set_xlabel("time (s)")
     panels[1].legend(fontsize="small")
-    replace(marks, modes=modes).explained(result.figures[result.name])
+    Marks(events).explained(result.figures[result.name])

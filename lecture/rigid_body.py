@@ -25,7 +25,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Vector
 from msgs_config.geometry import rotations
 from msgs_config.messages.clock import FIRST_TICK, TickClock
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 
 TITLE = "a free rigid body: m dv/dt = f, I dw/dt + w x I w = tau + r x f"
 RUNS = 8
@@ -64,7 +64,7 @@ class Observed:
     trial: Trial
     recording: Recording
     motion: RigidBodyMotion  # (t + 1) simulated states
-    theory: RigidBodyMotion  # at the same times
+    theory: RigidBodyMotion  # the theory at the same times
     momenta: Momenta
 
     @property

@@ -8,7 +8,6 @@ PACKAGES = {
     "gymnasium": ("gymnasium",),
     "meshes": ("trimesh",),
     "plan": ("numba",),
-    "search": ("cma",),
     "video": ("av",),
     "view": ("viser", "websockets"),
     "wheels": ("rclpy",),

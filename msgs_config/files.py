@@ -17,7 +17,7 @@ import yaml
 from msgs_config.errors import ActuatedCharactersError
 
 _find_in_ros: Callable[[str], str] | None = None
-with suppress(ImportError):  # without ROS
+with suppress(ImportError):  # there may be no ROS
     from ament_index_python.packages import get_package_share_directory as _find_in_ros
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
@@ -25,7 +25,7 @@ MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
 MAX_XML_CHARACTERS = 2 * 1024 * 1024
 MAX_XML_NESTING = 64
 _PACKAGE = "package://"
-_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification
 _BYTE_ORDER_MARKS = (  # UTF-32's little-endian one begins as UTF-16's does
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -36,9 +36,8 @@ _BYTE_ORDER_MARKS = (  # UTF-32's little-endian one begins as UTF-16's does
     (b"<\0", "utf-16-le"),
     (b"\0<", "utf-16-be"),
 )
-LFS_REASON = (
-    "is a Git LFS pointer, not the file itself; 'git lfs pull' in its repository gets the file"
-)
+LFS_REMEDY = "'git lfs pull' in its repository gets the file"
+LFS_REASON = f"is a Git LFS pointer, not the file itself; {LFS_REMEDY}"
 _DECLARED_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._:-]+)["']""")
 
 
@@ -90,7 +89,7 @@ def _read_bytes(path: Path, error: type[ActuatedCharactersError], most: int | No
     except (OSError, ValueError) as cause:  # ValueError: a NUL in the path
         reason = cause.strerror if isinstance(cause, OSError) else "not a text file"
         raise error(f"{path}: {reason}") from cause
-    if raw.startswith(_LFS_POINTER):
+    if raw.startswith(LFS_POINTER):
         raise error(f"{path} {LFS_REASON}")
     return raw
 
@@ -104,7 +103,7 @@ def is_lfs_pointer(path: Path) -> bool:
     if path.stat().st_size > _LFS_POINTER_BYTES:
         return False
     with path.open("rb") as file:
-        return file.read(len(_LFS_POINTER)) == _LFS_POINTER
+        return file.read(len(LFS_POINTER)) == LFS_POINTER
 
 
 class XmlText(NamedTuple):
@@ -196,7 +195,7 @@ def parse_yaml(
 
 
 _TAG = "tag:yaml.org,2002:"
-_NUMBERS = {  # of YAML 1.2 and JSON
+_NUMBERS = {  # the forms of numbers in YAML 1.2 and JSON
     "int": r"[-+]?[0-9]+",
     "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
     r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",

@@ -7,7 +7,7 @@ specifications by the same function, so that a value is right or wrong in the sa
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.mappings import show_value
@@ -16,8 +16,7 @@ from msgs_config.plain_values import as_plain
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | list[str] | list[float]
 
-_Kind = TypeVar("_Kind")
-_MAX_NUMBER = 1e12
+MAX_NUMBER = 1e12
 _LARGEST_FLOAT = sys.float_info.max
 
 
@@ -30,7 +29,7 @@ class Parameter:
     description: str
     unit: str = ""
     minimum: float = 0.0
-    maximum: float = _MAX_NUMBER
+    maximum: float = MAX_NUMBER
     choices: tuple[str, ...] = ()
     texts: bool = False  # an empty list as the default is one of texts, not of numbers
     live: bool = False  # may be changed while the node runs
@@ -83,35 +82,12 @@ class Parameter:
 
 
 class Values(dict[str, Value]):
-    """The values of a node's parameters by name, each taken out in the type that it has."""
-
-    def flag(self, name: str) -> bool:
-        """The value of a parameter that is true or false."""
-        return self._typed(name, bool)
-
-    def integer(self, name: str) -> int:
-        """The value of a whole-number parameter."""
-        return self._typed(name, int)
+    """The checked values of a node's parameters by name; `Settings` take them out, typed."""
 
     def number(self, name: str) -> float:
-        """The value of a floating-point parameter."""
-        return self._typed(name, float)
-
-    def text(self, name: str) -> str:
-        """The value of a text parameter."""
-        return self._typed(name, str)
-
-    def numbers(self, name: str) -> tuple[float, ...]:
-        """The value of a parameter that lists numbers."""
-        return tuple(map(float, self._typed(name, list)))
-
-    def texts(self, name: str) -> tuple[str, ...]:
-        """The value of a parameter that lists texts."""
-        return tuple(map(str, self._typed(name, list)))
-
-    def _typed(self, name: str, kind: type[_Kind]) -> _Kind:
+        """The value of a floating-point parameter whose name depends on the character."""
         value = self[name]
-        assert isinstance(value, kind)
+        assert isinstance(value, float)
         return value
 
 

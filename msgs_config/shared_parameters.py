@@ -4,41 +4,66 @@ from collections.abc import Mapping
 
 from msgs_config.character.model import Character, Placement
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Parameter
+from msgs_config.settings import Settings, parameter
 
 DEFAULT_CHARACTER = "humanoid"
 PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any other is a URDF's path
-
-CHARACTER = Parameter(
-    "character",
-    DEFAULT_CHARACTER,
-    "name of a shipped character, or path of a .yaml, .urdf or .xacro file",
-)
 FROM_FILE, NO_COLLISIONS = "file", "none"
-COLLISION = Parameter(
-    "collision",
-    FROM_FILE,
-    "what the character collides with: as its file has it, or nothing, in which case meshes may be "
-    "missing",
-    choices=(FROM_FILE, NO_COLLISIONS),
-)
-RATE = Parameter("rate", 240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
-GRAVITY = Parameter(
-    "gravity", 9.81, "gravity along -z", unit="m/s^2", maximum=1000.0, at_reset=True
-)
-COMMAND_DELAY = Parameter(
-    "command_delay_ticks",
-    0,
-    "a command is applied this many ticks late; a planner counts with it",
-    maximum=100_000,
-)
-PLACEMENT = Parameter(
-    "placement",
-    [0.0, 0.0, 0.0, 0.0],
-    "where the character's own world stands: x, y, z, and its turn about z",
-    unit="m, m, m, rad",
-    minimum=-1e12,
-)
+
+
+class CharacterSource(Settings):
+    """Which character it is, and where it stands; all other parameters depend on these."""
+
+    character: str = parameter(
+        DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml, .urdf or .xacro file"
+    )
+    collision: str = parameter(
+        FROM_FILE,
+        "what the character collides with: as its file has it, or nothing, in which case meshes "
+        "may be missing",
+        choices=(FROM_FILE, NO_COLLISIONS),
+    )
+    placement: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0),
+        "where the character's own world stands: x, y, z, and its turn about z",
+        unit="m, m, m, rad",
+        minimum=-1e12,
+    )
+
+
+class SharedSettings(Settings):
+    """What both sides are set to, whatever the character is."""
+
+    rate: int = parameter(240, "control ticks a second", unit="Hz", minimum=1, maximum=100_000)
+    gravity: float = parameter(
+        9.81, "gravity along -z", unit="m/s^2", maximum=1000.0, at_reset=True
+    )
+    command_delay_ticks: int = parameter(
+        0, "a command is applied this many ticks late; a planner counts with it", maximum=100_000
+    )
+
+    @property
+    def period(self) -> float:
+        """Length of a tick in s."""
+        return 1.0 / self.rate
+
+
+class KeyframeSettings(Settings):
+    """How often a node publishes keyframes, and from which one it goes on."""
+
+    period: float = parameter(
+        5.0,
+        "of the keyframes from which a fork can begin; a large one comes less often; 0: none",
+        name="keyframe_period",
+        unit="s",
+        maximum=1e6,
+    )
+    file: str = parameter("", "file of a keyframe, from which the run goes on", name="keyframe")
+
+
+CHARACTER, COLLISION, PLACEMENT = CharacterSource.declared()
+RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
+KEYFRAME_PERIOD, KEYFRAME = KeyframeSettings.declared()
 
 
 def collides(given: Mapping[str, object]) -> bool:

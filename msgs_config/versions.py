@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from importlib import metadata
 
 _PACKAGES = ("actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy")
-_UNKNOWN = "unknown"
+_UNKNOWN_VERSION = "unknown"
 
 
 def installed_versions() -> dict[str, str]:
@@ -15,8 +15,8 @@ def installed_versions() -> dict[str, str]:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:  # a ROS install has some from elsewhere
-            versions[package] = _UNKNOWN
-    versions["libc"] = " ".join(filter(None, platform.libc_ver())) or _UNKNOWN
+            versions[package] = _UNKNOWN_VERSION
+    versions["libc"] = " ".join(filter(None, platform.libc_ver())) or _UNKNOWN_VERSION
     return versions
 
 
@@ -35,6 +35,7 @@ def describe_changes(recorded: Mapping[str, str], present: Mapping[str, str]) ->
     changes = [
         f"{name} {before} (now {present[name]})"
         for name, before in recorded.items()
-        if _UNKNOWN not in (before, present.get(name, _UNKNOWN)) and before != present[name]
+        if _UNKNOWN_VERSION not in (before, present.get(name, _UNKNOWN_VERSION))
+        and before != present[name]
     ]
     return f"recorded with {', '.join(changes)}" if changes else ""

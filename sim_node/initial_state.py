@@ -10,53 +10,54 @@ from msgs_config.character.lowest_points import describe_start_below_ground
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import Parameter, Value, Values
+from msgs_config.parameters import Value, Values
+from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import PLANE
+from sim_node.physics.settings import SimulationSettings
 
 GIVEN, REFERENCE = "given", "reference"
 INITIAL_STATE, POSITION, VELOCITY = "initial_state", "initial_position", "initial_velocity"
 _LIMIT_ROUNDING = 1e-9  # rad or m by which a position may be beyond its limits
 
 
-def initial_state_parameters(character: Character) -> list[Parameter]:
-    """The parameters that say where a character begins."""
-    return [
-        Parameter(
-            INITIAL_STATE,
-            GIVEN,
-            f"where it begins: given by {POSITION} and {VELOCITY}, or reference: in the state in "
-            "which the reference of its controller_node begins",
-            choices=(GIVEN, REFERENCE),
-            at_reset=True,
-        ),
-        Parameter(
-            POSITION,
-            list(character.rest_position),
-            "position of each degree of freedom at the start",
-            unit="rad or m",
-            minimum=-1e12,
-            at_reset=True,
-        ),
-        Parameter(
-            VELOCITY,
-            [0.0] * character.layout.size,
-            "velocity of each degree of freedom at the start",
-            unit="rad/s or m/s",
-            minimum=-1e12,
-            at_reset=True,
-        ),
-    ]
+class CharacterSettings(Settings):
+    """What of a character is commanded, and where it begins. The defaults are the character's."""
 
+    commanded_joints: tuple[str, ...] = parameter(
+        (), "the joints that must be commanded, and that alone may be; with 'root': assistance"
+    )
+    initial_state: str = parameter(
+        GIVEN,
+        f"where it begins: given by {POSITION} and {VELOCITY}, or reference: in the state in "
+        "which the reference of its controller_node begins",
+        choices=(GIVEN, REFERENCE),
+        at_reset=True,
+    )
+    initial_position: tuple[float, ...] = parameter(
+        (),
+        "position of each degree of freedom at the start",
+        unit="rad or m",
+        minimum=-1e12,
+        at_reset=True,
+    )
+    initial_velocity: tuple[float, ...] = parameter(
+        (),
+        "velocity of each degree of freedom at the start",
+        unit="rad/s or m/s",
+        minimum=-1e12,
+        at_reset=True,
+    )
 
-def begins_with_reference(values: Values) -> bool:
-    """Whether the controller has to say in which state the character begins."""
-    return values.text(INITIAL_STATE) == REFERENCE
+    @property
+    def begins_with_reference(self) -> bool:
+        """Whether the controller has to say in which state the character begins."""
+        return self.initial_state == REFERENCE
 
 
 def check_given(values: Values, given: Mapping[str, object]) -> None:
     """Raise ConfigurationError if a state is given to a character that begins elsewhere."""
     for name in (POSITION, VELOCITY):
-        if begins_with_reference(values) and name in given:
+        if CharacterSettings.of(values).begins_with_reference and name in given:
             raise ConfigurationError(
                 f"parameter '{name}' is given, and '{INITIAL_STATE}' is {REFERENCE}; leave out "
                 f"'{name}', or set '{INITIAL_STATE}' to {GIVEN}"
@@ -108,17 +109,19 @@ def describe_start(character: Character, values: Values) -> tuple[str, ...]:
     Raises:
         CharacterError: a mesh cannot be used.
     """
-    if values.text("terrain") != PLANE:
+    if SimulationSettings.of(values).terrain != PLANE:
         return ()
-    return describe_start_below_ground(character, np.array(values.numbers(POSITION)))
+    return describe_start_below_ground(
+        character, np.array(CharacterSettings.of(values).initial_position)
+    )
 
 
 def changed_start(before: Values, after: Values) -> StampedState | None:
     """The state in which a character begins by its values, where it is another than before."""
-    starts = [(each.numbers(POSITION), each.numbers(VELOCITY)) for each in (before, after)]
-    if starts[0] == starts[1]:
+    old, new = CharacterSettings.of(before), CharacterSettings.of(after)
+    position, velocity = new.initial_position, new.initial_velocity
+    if (position, velocity) == (old.initial_position, old.initial_velocity):
         return None
-    position, velocity = starts[1]
     return StampedState(0, np.array(position), np.array(velocity), None)
 
 

@@ -8,12 +8,12 @@ from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.bus.once_logger import UNLOGGED, OnceLogger
 from msgs_config.errors import SimulationError
 from msgs_config.messages import topics
-from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.session import OwnSession, make_session
 from msgs_config.parameters import Values
 from sim_node.interface.character_interface import CharacterInterface
 from sim_node.interface.episode_parameters import EpisodeParameters
 from sim_node.interface.initial_state_topic import InitialStates, log_warnings
+from sim_node.interface.keyframes import SimulatorKeyframes
 from sim_node.interface.publisher_diagnosis import (
     ConflictLog,
     OtherSimulators,
@@ -24,10 +24,11 @@ from sim_node.interface.publishers import wait_for_subscribers
 from sim_node.interface.services import Services
 from sim_node.interface.simulator_publisher import SimulatorPublisher
 from sim_node.interface.world_interface import WorldInterface
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters, load_parameters
 from sim_node.physics.probe import measure_probe
-from sim_node.simulation_factory import change_world, make_simulation
+from sim_node.physics.settings import WorldSettings
+from sim_node.simulation_factory import make_simulation
 from sim_node.timing.flow_control import FlowControl
 from sim_node.timing.lockstep import CommandStatus
 from sim_node.timing.rate_limiter import RateLimiter
@@ -36,7 +37,7 @@ from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 _FLUSH_TIME = 10.0  # s that subscribers may take to acknowledge the last messages
 _STOP_FLUSH_TIME = 0.5  # s that subscribers may take after a signal or an error
-_MOST_COMMANDS = 1000  # that are taken in a row in real time; a flood must not stop the world
+_MOST_COMMANDS = 1000  # taken in a row in real time; a flood must not stop the world
 
 
 class SimNode(ComposableNode):
@@ -52,12 +53,17 @@ class SimNode(ComposableNode):
         """
         super().__init__(node or ros_node(topics.SIM_NODE))
         loaded = load_parameters(self.node.given_parameters())
-        self._settings = make_node_settings(loaded.values)
+        self._settings = NodeSettings.of(loaded.values)
         self._build_simulation(loaded)
         self._given = EpisodeParameters(self.node, loaded, self._change_parameters)
-        self.session = self._settings.session or make_session(self.node.get_fully_qualified_name())
+        self.session = self._settings.session.id or make_session(
+            self.node.get_fully_qualified_name()
+        )
         """The session of all messages of this simulator."""
         self._once_logger = OnceLogger(self.node.get_logger())
+        self._keyframes = SimulatorKeyframes(
+            self.node, self._simulation, loaded.values, self.session
+        )
         self._open_topics()
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)
         self._rate_limiter = RateLimiter(self._settings.tick_period)
@@ -67,9 +73,10 @@ class SimNode(ComposableNode):
             not self._settings.is_realtime,
         )
         self._next_diagnostics, self._timeouts, self._begun = 0.0, 0, False
+        self._first_tick = self._simulation.tick
         self._control = RunControl()
         self._run_services = Services(
-            self.node, self._control, lambda: self._settings.step_ticks, self._resume, self._reset
+            self.node, self._control, lambda: self._settings.step_count, self._resume, self._reset
         )
 
     @property
@@ -84,7 +91,7 @@ class SimNode(ComposableNode):
 
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, and probe the engine."""
-        gravity = loaded.values.number("gravity")
+        gravity = WorldSettings.of(loaded.values).gravity
         self._samples = [measure_probe(each.character, gravity) for each in loaded.characters]
         self._simulation = make_simulation(loaded)
         self._initial_states = InitialStates(self.node, self._simulation.characters, loaded)
@@ -105,7 +112,7 @@ class SimNode(ComposableNode):
         self._world = WorldInterface(self.node, self._simulation, own_session, self._once_logger)
         publishers = [each.publishers for each in self._characters]
         self._publisher = SimulatorPublisher(
-            self.node, self._simulation, self._world, publishers, self._samples
+            self.node, self._simulation, self._world, publishers, self._samples, self._keyframes
         )
         self._diagnostics = DiagnosticsPublisher(self.node)
         self._conflict_log = ConflictLog(self.node, self._once_logger)
@@ -137,7 +144,7 @@ class SimNode(ComposableNode):
 
     @property
     def _finished(self) -> bool:
-        ticks = self._simulation.tick - FIRST_TICK
+        ticks = self._simulation.tick - self._first_tick
         return not self._control.has_diverged and 0 < self._settings.max_ticks <= ticks
 
     @property
@@ -152,13 +159,15 @@ class SimNode(ComposableNode):
         if states:
             self._simulation.begin_in(states)
         self._given.begin_in(states)
+        self._keyframes.go_on()
+        self._first_tick = self._simulation.tick
         # A run, which gives its simulator the session, has shown the warnings itself.
-        if not self._settings.session:
+        if not self._settings.session.id:
             log_warnings(self.node, self._given.in_force)
         self._publisher.publish_configurations(self._given.in_force)
         count = self._settings.wait_for_subscribers
         yield from wait_for_subscribers(self.node, self._publisher.of_characters, count, stop)
-        self._begin_episode()
+        self._begin_episode(self._keyframes.episode_ns)
 
     def _spin_once(self, executor: Executor) -> float:
         """Take commands, and advance if the tick is complete and due; the turn's result."""
@@ -191,8 +200,9 @@ class SimNode(ComposableNode):
                     self._on_conflict(each)
         return received
 
-    def _begin_episode(self) -> None:
-        self._publisher.publish_episode()
+    def _begin_episode(self, first_ns: int) -> None:
+        """Begin to simulate an episode, whose first state has that stamp: at it, or later."""
+        self._publisher.publish_episode(first_ns)
         self._begun = True
         self._rate_limiter.restart(time.monotonic())
         self._begin_tick()
@@ -232,14 +242,14 @@ class SimNode(ComposableNode):
             self._next_diagnostics = now + DIAGNOSTICS_PERIOD
             self._publish_diagnostics()
             self._conflict_log.log()
-            self._others.look()
+            self._others.look_at_graph()
         for event in self._watchdog.due(now):
             waits = self._control.runs and not self._complete
             if event is WatchdogEvent.REPUBLISH:
                 self._publisher.republish(with_states=waits, with_episode=self._others.seen)
             elif waits and event is WatchdogEvent.EXPLAIN:
                 self.node.get_logger().warning(self._describe_waiting())
-            elif waits and self._simulation.tick > FIRST_TICK:  # the first tick just waits
+            elif waits and self._simulation.tick > self._first_tick:  # that one just waits
                 self._on_timeout()
 
     def _describe_waiting(self) -> str:
@@ -284,19 +294,20 @@ class SimNode(ComposableNode):
         """Begin a new episode, now or when all awaited subscribers are there."""
         last_ns = self._simulation.stamp_ns
         starts = self._given.begin_episode(self._initial_states.newest())
-        world = change_world(self._simulation.settings.world, self._given.in_force.values)
+        world = self._simulation.settings.world.changed(self._given.in_force.values)
         self._simulation.reset(world, starts or {})
+        self._keyframes.episode_ns = self._simulation.stamp_ns
         self._world.begin_episode()
         for each in self._characters:
             each.begin_episode()
         if starts is not None:
             self._publisher.change(self._given.in_force, last_ns if self._begun else None)
         if self._begun:
-            self._begin_episode()
+            self._begin_episode(self._simulation.stamp_ns)
 
     def _change_parameters(self, values: Values) -> None:
         """Take changed parameters, at this tick's boundary."""
-        self._settings = make_node_settings(values)
+        self._settings = NodeSettings.of(values)
         if self._settings.tick_period != self._rate_limiter.period:
             self._rate_limiter.change(self._settings.tick_period, time.monotonic())
         for each in self._characters:

@@ -8,21 +8,21 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, LayoutError
 from msgs_config.parameters import Parameter, Value, Values, resolve
-from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT, collides, placed
+from msgs_config.shared_parameters import CharacterSource, SharedSettings, collides, placed
 from sim_node.frames import FrameNames
 from sim_node.initial_state import (
     INITIAL_STATE,
     POSITION,
     REFERENCE,
     VELOCITY,
-    begins_with_reference,
+    CharacterSettings,
     check_given,
     check_length,
-    initial_state_parameters,
 )
-from sim_node.world_parameters import WORLD_PARAMETERS
+from sim_node.node_settings import NodeSettings
+from sim_node.physics.settings import SimulationSettings
 
-_NEEDED_FIRST = (CHARACTER, COLLISION, PLACEMENT)  # the other parameters depend on these
+_NEEDED_FIRST = CharacterSource.declared()
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,63}")
 
 CHARACTERS = Parameter(
@@ -32,21 +32,23 @@ CHARACTERS = Parameter(
     "parameters of a character are set below its name",
     texts=True,
 )
-PARAMETERS = [CHARACTER, COLLISION, PLACEMENT, *WORLD_PARAMETERS]
+WORLD_PARAMETERS = [
+    *SharedSettings.declared(),
+    *SimulationSettings.declared(),
+    *NodeSettings.declared(),
+]
+"""Those that all characters of a world have in common."""
+PARAMETERS = [*_NEEDED_FIRST, *WORLD_PARAMETERS]
 """Those of a simulator of one character, beside `character_parameters`."""
 
 
 def character_parameters(character: Character) -> list[Parameter]:
     """The parameters whose defaults depend on the character."""
-    return [
-        Parameter(
-            "commanded_joints",
-            character.layout.actuated_joint_names,
-            "the joints that must be commanded, and that alone may be; with 'root': assistance",
-            texts=True,
-        ),
-        *initial_state_parameters(character),
-    ]
+    return CharacterSettings.declared(
+        commanded_joints=character.layout.actuated_joint_names,
+        initial_position=list(character.rest_position),
+        initial_velocity=[0.0] * character.layout.size,
+    )
 
 
 def resolve_alone(character: Character, given: Mapping[str, object]) -> Values:
@@ -88,8 +90,12 @@ class SimulatorParameters:
     @property
     def open(self) -> list[Parameter]:
         """The parameters that wait for the state in which a controller's reference begins."""
-        from_reference = [one for one in self.characters if begins_with_reference(one.values)]
-        names = {one.prefix + name for one in from_reference for name in (POSITION, VELOCITY)}
+        names = {
+            each.prefix + name
+            for each in self.characters
+            if CharacterSettings.of(each.values).begins_with_reference
+            for name in (POSITION, VELOCITY)
+        }
         return [parameter for parameter in self.declared if parameter.name in names]
 
     def with_values(self, changes: Mapping[str, Mapping[str, Value]]) -> "SimulatorParameters":
@@ -127,7 +133,7 @@ class SimulatorParameters:
         Where it begins with its reference, the controller alone says it.
         """
         for each in self.characters:
-            with_reference = after.text(each.prefix + INITIAL_STATE) == REFERENCE
+            with_reference = CharacterSettings.of(after, each.prefix).begins_with_reference
             for name in (POSITION, VELOCITY):
                 full_name = each.prefix + name
                 value = after[full_name]
@@ -191,12 +197,12 @@ def _given_to(name: str, names: list[str], given: Mapping[str, object]) -> dict[
 def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
     try:
         first = {p.name: given[p.name] for p in _NEEDED_FIRST if p.name in given}
-        alone = resolve(_NEEDED_FIRST, first)
-        character = placed(load_character(alone.text(CHARACTER.name), collides(alone)), alone)
+        name_or_path = CharacterSource.given(first).character
+        character = placed(load_character(name_or_path, collides(first)), first)
         values = resolve_alone(character, given)
         check_given(values, given)
         FrameNames.of(values).check(character)
-        character.check_driven(values.texts("commanded_joints"))
+        character.check_driven(CharacterSettings.of(values).commanded_joints)
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
     return CharacterParameters(name, character, values)

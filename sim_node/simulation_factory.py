@@ -6,16 +6,15 @@ from pathlib import Path
 from msgs_config import files
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
-from msgs_config.character.urdf.source import read_urdf_text
+from msgs_config.character.urdf.file_formats.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
-from sim_node.initial_state import POSITION, VELOCITY
+from sim_node.initial_state import CharacterSettings
 from sim_node.parameters import SimulatorParameters
+from sim_node.physics.settings import SimulationSettings
 from sim_node.physics.simulated_character import CharacterSetup
-from sim_node.physics.simulation import Simulation, SimulationSettings
-from sim_node.physics.world import WorldSettings
-from sim_node.world_parameters import CONTACT_BREAKING_THRESHOLD
+from sim_node.physics.simulation import Simulation
 
 
 def make_simulation(parameters: SimulatorParameters) -> Simulation:
@@ -33,11 +32,12 @@ def make_simulation(parameters: SimulatorParameters) -> Simulation:
 
 def make_character_setup(character: Character, values: Values, name: str = "") -> CharacterSetup:
     """The character's part in the simulation that the parameters' values say."""
+    own = CharacterSettings.of(values)
     return CharacterSetup(
         character=character,
-        commanded_joints=values.texts("commanded_joints"),
-        initial_position=values.numbers(POSITION),
-        initial_velocity=values.numbers(VELOCITY),
+        commanded_joints=own.commanded_joints,
+        initial_position=own.initial_position,
+        initial_velocity=own.initial_velocity,
         name=name,
     )
 
@@ -48,35 +48,15 @@ def make_simulation_settings(values: Values) -> SimulationSettings:
     Raises:
         CharacterError: the terrain's URDF cannot be read.
     """
-    rate, substeps = values.integer("rate"), values.integer("substeps")
-    terrain, lifetime = values.text("terrain"), values.number("ball_lifetime")
-    return SimulationSettings(
-        rate_hz=rate,
-        substeps=substeps,
-        speed_limit=values.number("speed_limit"),
-        command_delay_ticks=values.integer("command_delay_ticks"),
-        ball_ticks=max(round(lifetime * rate), 1) if lifetime else 0,
-        world=change_world(
-            WorldSettings(
-                step_s=1.0 / (rate * substeps),
-                ground=terrain == PLANE,
-                terrain=None if terrain in (PLANE, NO_GROUND) else _read_terrain(terrain),
-            ),
-            values,
-        ),
+    settings = SimulationSettings.of(values)
+    on_plane, in_air = settings.terrain == PLANE, settings.terrain == NO_GROUND
+    world = replace(
+        settings.world,
+        step_s=settings.step_s,
+        ground=on_plane,
+        terrain=None if on_plane or in_air else _read_terrain(settings.terrain),
     )
-
-
-def change_world(world: WorldSettings, values: Values) -> WorldSettings:
-    """A world's settings with those of the parameters' values that may change at a reset."""
-    return replace(
-        world,
-        gravity=values.number("gravity"),
-        friction=values.number("friction"),
-        link_friction=values.number("link_friction"),
-        solver_iterations=values.integer("solver_iterations"),
-        contact_breaking_threshold=values.number(CONTACT_BREAKING_THRESHOLD),
-    )
+    return replace(settings, world=world)
 
 
 def _read_terrain(path: str) -> UrdfOptions:

@@ -1,13 +1,23 @@
 """The messages of a bag, by the character or the world that they are of."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from actuated_characters.bags.reader import read_messages
-from actuated_characters.bags.tracks import CharacterTimeline, WorldTimeline
+from actuated_characters.bags.keyframes import KeyframePlace
+from actuated_characters.bags.reader import RecordedMessage, read_messages, read_topics
+from actuated_characters.bags.tracks import Beginnings, CharacterTimeline, WorldTimeline
 from msgs_config.errors import ActuatedCharactersError
+from msgs_config.messages import topics
+
+_EARLIER_NS = 200_000_000  # ns by which messages of one tick may be apart, on a busy machine
+_LATCHED = tuple(
+    f"/{topic.name}"
+    for each in topics.TABLE
+    if each.quality.is_latched and each.is_read
+    for topic in each.as_others_name_it
+)
 
 
 @contextmanager
@@ -20,17 +30,32 @@ def naming(bag: Path, timeline: CharacterTimeline | WorldTimeline) -> Iterator[N
         raise type(error)(f"recording {where}: {error}") from error
 
 
-def collect(bag: Path) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
-    """Collect the messages of each namespace, on topics that have the contract's names."""
+def collect(
+    bag: Path,
+    begin: KeyframePlace | None = None,
+    messages: Iterable[RecordedMessage] | None = None,
+) -> tuple[list[CharacterTimeline], dict[str, WorldTimeline]]:
+    """Collect the messages of each namespace, on topics that have the contract's names.
+
+    From the place of a keyframe on, where there is one, but the latched ones from the start; or
+    those that are given.
+    """
     characters: dict[str, CharacterTimeline] = {}
     worlds: dict[str, WorldTimeline] = {}
+    begins, first_ns, latched = Beginnings(), 0, list[str]()
+    if begin is not None:
+        begins.first_ns = begin.stamp_ns
+        first_ns = begin.log_time_ns - _EARLIER_NS
+        latched = [name for name in read_topics(bag) if name.endswith(_LATCHED)]
     # by topic: the timeline of its namespace, and the topic's name in that
     places: dict[str, tuple[CharacterTimeline | WorldTimeline, str] | None] = {}
-    for message in read_messages(bag):
+    if messages is None:
+        messages = read_messages(bag, first_ns=first_ns, whole=latched)
+    for message in messages:
         topic = message.topic
         if topic not in places:
-            places[topic] = _timeline(topic, WorldTimeline, worlds) or _timeline(
-                topic, CharacterTimeline, characters
+            places[topic] = _timeline(topic, WorldTimeline, worlds, begins) or _timeline(
+                topic, CharacterTimeline, characters, begins
             )
         if (place := places[topic]) is not None:
             timeline, name = place
@@ -47,11 +72,11 @@ _Timeline = TypeVar("_Timeline", CharacterTimeline, WorldTimeline)
 
 
 def _timeline(
-    topic: str, kind: type[_Timeline], timelines: dict[str, _Timeline]
+    topic: str, kind: type[_Timeline], timelines: dict[str, _Timeline], begins: Beginnings
 ) -> tuple[_Timeline, str] | None:
     """The timeline that takes a topic's messages, and its name there; None if none of a kind."""
     for name in kind.TOPICS:
         if f"/{topic}".endswith(f"/{name}"):
             namespace = topic.removesuffix(name).strip("/")
-            return timelines.setdefault(namespace, kind(namespace)), name
+            return timelines.setdefault(namespace, kind(namespace, begins)), name
     return None

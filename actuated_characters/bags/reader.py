@@ -2,7 +2,8 @@
 
 import heapq
 import tempfile
-from collections.abc import Collection, Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,8 +12,11 @@ from actuated_characters.bags.format import limits, metadata, storage
 from actuated_characters.bags.format.definitions import find_message_type
 from actuated_characters.bags.format.mcap_file import McapFile
 from actuated_characters.bags.format.sqlite_file import SqliteFile
+from actuated_characters.bags.format.storage import Beginning
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
+
+_ALL = Beginning()
 
 
 class RecordedMessage(NamedTuple):
@@ -45,7 +49,13 @@ class RecordedMessage(NamedTuple):
             ) from error
 
 
-def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
+def read_messages(
+    path: Path,
+    topics: Collection[str] | None = None,
+    *,
+    first_ns: int = 0,
+    whole: Collection[str] = (),
+) -> Iterator[RecordedMessage]:
     """Yield the messages of a recording, or those of `topics` only.
 
     They come in the order of their log times; those of equal time in that of their publishing, and
@@ -54,12 +64,16 @@ def read_messages(path: Path, topics: Collection[str] | None = None) -> Iterator
     Args:
         path: A rosbag2 directory, or a single .mcap or .db3 file that is complete.
         topics: Names as they are in the recording.
+        first_ns: Log time from which on they are read.
+        whole: Names of topics that are read from the start nevertheless.
 
     Raises:
         RecordingError: There is no complete recording at `path`, or it has none of a topic's name.
     """
-    with _reading(path) as stack:
-        yield from _messages(path, topics, stack)
+    with open_bag(path) as bag:
+        for message in bag.messages(topics, Beginning(first_ns, frozenset(whole))):
+            if message.log_time_ns >= first_ns or message.topic in whole:
+                yield message
 
 
 def read_topics(path: Path) -> dict[str, str]:
@@ -68,10 +82,76 @@ def read_topics(path: Path) -> dict[str, str]:
     Raises:
         RecordingError: there is no complete recording at `path`.
     """
+    with open_bag(path) as bag:
+        return bag.types
+
+
+@contextmanager
+def open_bag(path: Path) -> "Iterator[OpenBag]":
+    """Open a recording, to read of it what is wanted; any error in there gets its name.
+
+    Raises:
+        RecordingError: There is no complete recording at `path`, or it is damaged in what is read.
+    """
     with _reading(path) as stack:
-        _, files = _files(path, stack)
-        found = [topic for file in files for topic in file.topics.values()]
-        return {topic.name: topic.type_name for topic in found}
+        read = metadata.BagMetadata((path,), (), "", {})
+        if not path.is_file():
+            read = metadata.read_metadata(path)
+        files = [_open(path, file, read.compression_mode, stack) for file in read.files]
+        yield OpenBag(path, read, files)
+
+
+class OpenBag:
+    """A recording whose files are open."""
+
+    def __init__(
+        self, path: Path, read: metadata.BagMetadata, files: Sequence[McapFile | SqliteFile]
+    ) -> None:
+        self.metadata = read
+        topics = [topic for file in files for topic in file.topics.values()]
+        self.types = {topic.name: topic.type_name for topic in topics}
+        """The type of each topic, such as `sensor_msgs/msg/JointState`."""
+        self.has_simulated_log_times = any(topic.has_simulated_log_time for topic in topics)
+        self._path, self._is_file, self._files = path, path.is_file(), files
+
+    def statistics(self) -> storage.FileStatistics:
+        """Those of all files; messages are read only where a file has no statistics."""
+        found = [each for each in (file.statistics() for file in self._files) if each.counts]
+        return storage.FileStatistics(
+            sum((Counter(each.counts) for each in found), Counter()),
+            min((each.first_ns for each in found), default=0),
+            max((each.last_ns for each in found), default=0),
+        )
+
+    def messages(
+        self, topics: Collection[str] | None = None, beginning: Beginning = _ALL
+    ) -> Iterator[RecordedMessage]:
+        """Yield messages as `read_messages` does; one such reading at a time.
+
+        Some of those before the beginning may be among them.
+        """
+        recorded = self.types.keys() | set(self.metadata.topics)
+        names = recorded if topics is None else set(topics)
+        if unknown := sorted(names - recorded):
+            raise RecordingError(one_of("topic", unknown[0], sorted(recorded)))
+        places = self.metadata.files
+        streams = [
+            _read(self._path, place, file, names, beginning)
+            for place, file in zip(places, self._files, strict=True)
+        ]
+        for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
+            yield self._unpacked(message)
+
+    def _unpacked(self, message: storage.StoredMessage) -> RecordedMessage:
+        log_time_ns, published_ns, _, topic, stored, _ = message
+        packed = self.metadata.compression_mode == metadata.MESSAGE
+        if self._is_file:  # no metadata says whether messages are compressed
+            packed = stored.startswith(storage.ZSTD_MAGIC)
+        try:
+            raw = limits.unpack_message(stored, packed=packed)
+        except limits.LimitError as error:
+            raise ValueError(f"on '{topic.name}' {error}") from error
+        return RecordedMessage(topic.name, log_time_ns, raw, topic.type_name, published_ns)
 
 
 @contextmanager
@@ -82,43 +162,11 @@ def _reading(path: Path) -> Iterator[ExitStack]:
             yield stack
         except RecordingError:
             raise
-        except Exception as error:  # for a damaged file the libraries raise anything
+        except Exception as error:  # the libraries raise anything for a damaged file
             text = f"cannot read recording {path}: {storage.reason(error)}"
-            if path.is_dir():  # of a file alone there is nothing to recover
+            if path.is_dir():  # nothing can be recovered of a file alone
                 text += metadata.recover_hint(path, "keeps what is whole of it")
             raise RecordingError(text) from error
-
-
-def _files(
-    path: Path, stack: ExitStack
-) -> tuple[metadata.BagMetadata, list[McapFile | SqliteFile]]:
-    """A recording's metadata, and its files, which are open until `stack` is closed."""
-    is_bag = not path.is_file()
-    bag = metadata.read_metadata(path) if is_bag else metadata.BagMetadata((path,), (), "")
-    return bag, [_open(path, file, bag.compression_mode, stack) for file in bag.files]
-
-
-def _messages(
-    path: Path, topics: Collection[str] | None, stack: ExitStack
-) -> Iterator[RecordedMessage]:
-    bag, files = _files(path, stack)
-    recorded = {topic.name for file in files for topic in file.topics.values()} | set(bag.topics)
-    names = recorded if topics is None else set(topics)
-    if unknown := sorted(names - recorded):
-        raise RecordingError(one_of("topic", unknown[0], sorted(recorded)))
-    streams = [
-        _read(path, place, file, names) for place, file in zip(bag.files, files, strict=True)
-    ]
-    for message in heapq.merge(*streams, key=lambda each: each.log_time_ns):
-        log_time_ns, published_ns, _, topic, stored, _ = message
-        packed = bag.compression_mode == metadata.MESSAGE
-        if path.is_file():  # no metadata says whether messages are compressed
-            packed = stored.startswith(storage.ZSTD_MAGIC)
-        try:
-            raw = limits.unpack_message(stored, packed=packed)
-        except limits.LimitError as error:
-            raise ValueError(f"on '{topic.name}' {error}") from error
-        yield RecordedMessage(topic.name, log_time_ns, raw, topic.type_name, published_ns)
 
 
 def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> McapFile | SqliteFile:
@@ -151,10 +199,14 @@ def _open(path: Path, file: Path, compression_mode: str, stack: ExitStack) -> Mc
 
 
 def _read(
-    path: Path, place: Path, file: McapFile | SqliteFile, names: Collection[str]
+    path: Path,
+    place: Path,
+    file: McapFile | SqliteFile,
+    names: Collection[str],
+    beginning: Beginning,
 ) -> Iterator[storage.StoredMessage]:
     with _naming(path, place):
-        yield from file.messages_by_time(names)
+        yield from file.messages_by_time(names, beginning)
 
 
 @contextmanager

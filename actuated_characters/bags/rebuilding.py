@@ -25,7 +25,7 @@ from msgs_config.shared_parameters import collides, placed
 class RecordedWorld:
     """The world that a character was in."""
 
-    namespace: str = ""  # of its simulator, without the leading slash
+    namespace: str = ""  # its simulator's, without the leading slash
     name: str = ""  # the character's name in its world, where there were several
     characters: tuple[str, ...] = ()  # the names of all characters, in the order of their entry
     terrain: UrdfOptions | None = None  # what there is beside the plane

@@ -1,6 +1,6 @@
 """Reads the recordings of characters from a bag, as arrays."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -10,12 +10,14 @@ import numpy as np
 from actuated_characters.bags.collecting import collect, naming
 from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
+from actuated_characters.bags.keyframes import KeyframePlace
 from actuated_characters.bags.node_parameters import NodeParameters, between, in_force
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_topics
 from actuated_characters.bags.rebuilding import RecordedWorld
 from actuated_characters.bags.tracks import (
     CONFIGURATION,
+    Beginnings,
     CharacterTimeline,
     CommandArrays,
     ModeChange,
@@ -56,7 +58,7 @@ class Recording:
     Tick k leads from state k to state k + 1. Units and frames: docs/topics.md, "Conventions".
     """
 
-    character: Character  # in its place in the world, made from the texts in the bag
+    character: Character  # made from the texts in the bag, in its place in the world
     name: str = ""  # its topics' namespace without the leading slash
     parameters: Mapping[str, Any] = field(repr=False)  # the simulator's parameters at the start
     # the simulator's parameters, set after set; empty where they never changed
@@ -76,7 +78,7 @@ class Recording:
     controller: tuple[NodeParameters, ...] = ()  # the controller's parameters, set after set
     modes: tuple[ModeChange, ...] = ()  # the controller's changes of mode, in order
     plans: tuple[PlanArrays, ...] = ()  # the plans of a planner, in order
-    unstamped_commands: tuple[CommandArrays, ...] = ()  # in real time: those that answer no state
+    unstamped_commands: tuple[CommandArrays, ...] = ()  # commands of real time that answer no state
     pushes_sent: int = 0  # messages on `external_wrench`
     # (t,): throws that each tick began with; () if there were none
     throws: tuple[tuple[ProjectileThrow, ...], ...] = ()
@@ -84,6 +86,9 @@ class Recording:
     throws_sent: int = 0  # messages on `throw`
     skipped_states: int = 0  # states of an episode whose first state is not in the bag
     begins_amid: bool = False  # it begins in the middle of an episode, and no other one begins
+    # the simulator's and the controller's, serialised, where it begins with that state
+    keyframe: bytes | None = field(default=None, repr=False)
+    controller_keyframe: bytes | None = field(default=None, repr=False)
     world: RecordedWorld = field(default_factory=RecordedWorld)
 
     @property
@@ -130,6 +135,8 @@ class Recording:
             self,
             parameters=self.parameters_at(rows.start),
             simulator=between(self.simulator, int(cut["stamps_ns"][0]), last_ns),
+            keyframe=None if rows.start else self.keyframe,
+            controller_keyframe=None if rows.start else self.controller_keyframe,
             **cut,
         )
 
@@ -162,14 +169,15 @@ def read_recording(path: Path, character: str | None = None) -> Recording:
     return recordings[names.index(character)]
 
 
-def read_recordings(path: Path) -> tuple[Recording, ...]:
+def read_recordings(path: Path, begin: KeyframePlace | None = None) -> tuple[Recording, ...]:
     """Read every character's part of the bag in a run's directory, or of a bag itself.
 
     They come in the order in which they are in their world. Messages before the first state of an
-    episode are left out, unless none begins in the bag.
+    episode, or of a keyframe, are left out, unless there is none in the bag.
 
     Args:
         path: The directory that a run, a recorder or `ros2 bag record` has left.
+        begin: The keyframe to begin with; what is before is not read, as far as it is not latched.
 
     Raises:
         RecordingError: there is no complete bag; it holds no states, those of several simulators
@@ -177,13 +185,20 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
         ActuatedCharactersError: a message has not its topic's type and meaning.
     """
     bag = find_bag(path)
-    characters, worlds = collect(bag)
+    return make_recordings(bag, *collect(bag, begin))
+
+
+def make_recordings(
+    bag: Path, characters: Iterable[CharacterTimeline], worlds: Mapping[str, WorldTimeline]
+) -> tuple[Recording, ...]:
+    """Make recordings of what was collected from a bag.
+
+    Raises:
+        RecordingError: see `read_recordings`.
+    """
     known = [timeline for timeline in characters if timeline.rebuilt is not None]
     if not known:
-        raise RecordingError(
-            f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
-            f"which says what its states mean; {_what_it_is(read_topics(bag))}"
-        )
+        raise RecordingError(describe_foreign(bag, read_topics(bag)))
     recordings = []
     for timeline in known:
         with naming(bag, timeline):
@@ -191,14 +206,21 @@ def read_recordings(path: Path) -> tuple[Recording, ...]:
     return tuple(sorted(recordings, key=_place))
 
 
-def _what_it_is(types: Mapping[str, str]) -> str:
-    """What can be done with a bag whose topics are of these types."""
+def describe_foreign(bag: Path, types: Mapping[str, str]) -> str:
+    """What a bag is that is not of this project's simulator, and what can be done with it.
+
+    `types` are those of its topics.
+    """
     found = sorted(name for name, kind in types.items() if kind == JOINT_STATE)
-    if not found:
-        return f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    what = f"it has no {JOINT_STATE} either; its topics: {', '.join(sorted(types)) or 'none'}"
+    if found:
+        what = (
+            f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
+            "`export` take it with --character ROBOT.urdf --topic TOPIC"
+        )
     return (
-        f"it has joint states on {', '.join(found)}: `view`, `render`, `report` and "
-        "`motion export` take it with --character ROBOT.urdf --topic TOPIC"
+        f"bag {bag} is not of this project's simulator: it has nothing on '{CONFIGURATION}', "
+        f"which says what its states mean; {what}"
     )
 
 
@@ -229,11 +251,13 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
     """Turn a timeline into arrays. Raises RecordingError if it is not whole."""
     rebuilt = timeline.finish()
     known, states, size = rebuilt.known, timeline.states, rebuilt.known.layout.size
-    world = worlds.get(rebuilt.world.namespace, WorldTimeline(""))
+    world = worlds.get(rebuilt.world.namespace, WorldTimeline("", Beginnings()))
     stamps = states.integers("stamps_ns")
     stamp_list = stamps.tolist()
     ends, plans = stamp_list[1:], timeline.plans
     simulator = timeline.simulator.parameters
+    is_amid = bool(states.effort) and not np.isnan(states.effort[:size]).all()
+    keyframe = world.keyframes.get(stamp_list[0]) if is_amid else None
     reference_position, reference_velocity = _references(stamps, timeline.references, size)
     return Recording(
         character=rebuilt.character,
@@ -261,7 +285,9 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         balls=_at(stamp_list, world.balls, None),
         throws_sent=world.throws_sent,
         skipped_states=timeline.skipped_states,
-        begins_amid=timeline.begins_amid,
+        begins_amid=timeline.begins_amid and keyframe is None,
+        keyframe=keyframe,
+        controller_keyframe=timeline.keyframes.get(stamp_list[0]) if keyframe else None,
         world=rebuilt.world,
     )
 

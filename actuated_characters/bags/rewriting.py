@@ -76,7 +76,8 @@ def rewrite(damaged: Path, new: Path, progress: Progress) -> RecoveredContents:
             contents.add(topic.name, log_time_ns)
         for topic in (topic for file in files for topic in file.topics.values()):
             if topic.serialization == CDR:
-                _announce(topic, bag, announced)  # also without messages: a reader may ask for it
+                # A reader may ask for a topic that has no messages.
+                _announce(topic, bag, announced)
     return contents
 
 

@@ -15,7 +15,7 @@ from actuated_characters.bags.rebuilding import Rebuilt
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode_string
+from msgs_config.messages.cdr import decode_header, decode_string
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
@@ -30,6 +30,8 @@ _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 _MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 _PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
+_KEYFRAME = topics.KEYFRAME.of(topics.SIM_NODE).name
+_CONTROLLER_KEYFRAME = topics.CONTROLLER_KEYFRAME.of(topics.CONTROLLER_NODE).name
 _UNREADABLE_JSON = (ValueError, KeyError, TypeError, RecursionError)  # raised for foreign JSON
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
 _MOST_NAMED = 3  # gaps that an error names
@@ -72,15 +74,25 @@ class States:
         return np.frombuffer(getattr(self, name)).reshape(len(self.stamps_ns), size)
 
 
+@dataclass
+class Beginnings:
+    """The states with which recordings of a bag may begin, beside the first ones of episodes."""
+
+    first_ns: int = 0  # stamp before which none begins
+    keyframes: set[int] = field(default_factory=set)  # their stamps so far
+
+
 class WorldTimeline:
     """All messages on the balls in one namespace."""
 
     TOPICS: ClassVar = topics.names_to_read(of_world=True)
 
-    def __init__(self, namespace: str) -> None:
-        """`namespace` is without the leading slash."""
+    def __init__(self, namespace: str, begins: Beginnings) -> None:
+        """`namespace` is without the leading slash; `begins` gets the keyframes' stamps."""
         self.namespace = namespace
         self.has_wall_times = True
+        self.keyframes: dict[int, bytes] = {}  # serialised, by stamp
+        self._begins = begins
         # by the stamp of the state after the tick in which they begin
         self.throws: dict[int, tuple[ProjectileThrow, ...]] = {}
         self.balls: dict[int, BallStates] = {}  # by stamp
@@ -95,6 +107,10 @@ class WorldTimeline:
         """
         if name == topics.THROW.name:
             self.throws_sent += 1
+        elif name == _KEYFRAME:
+            stamp_ns, _ = decode_header(raw)
+            self.keyframes[stamp_ns] = raw
+            self._begins.keyframes.add(stamp_ns)
         elif name == topics.THROWN.name:
             balls = decode_balls(raw)
             self.balls[balls.stamp_ns] = balls
@@ -110,14 +126,15 @@ class CharacterTimeline:
     """All messages on one character, which is in one namespace.
 
     The simulator's configuration says what a message means; messages before it are kept until it
-    comes. States before the first one of an episode are left out.
+    comes. States before the first one of an episode, or of a keyframe, are left out.
     """
 
     TOPICS: ClassVar = topics.names_to_read(of_world=False)
 
-    def __init__(self, namespace: str) -> None:
-        """`namespace` is without the leading slash."""
-        self.namespace = namespace
+    def __init__(self, namespace: str, begins: Beginnings) -> None:
+        """`namespace` is without the leading slash; `begins` has the keyframes' stamps so far."""
+        self.namespace, self._begins = namespace, begins
+        self.keyframes: dict[int, bytes] = {}  # of the controller, serialised, by stamp
         self.has_wall_times = True  # False: times of publishing are simulated log times
         self.simulator = SimulatorConfigurations(namespace)
         self.states, self.references = States(), States()
@@ -135,7 +152,8 @@ class CharacterTimeline:
         self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
         self._early_lost = False
-        self._gaps: list[tuple[int, int]] = []
+        self.gaps: list[tuple[int, int]] = []  # first and last of ticks whose states are missing
+        self.repeated = 0  # states that came again, as in a pause
         self._last_tick = 0
         self._decoder, self._references, self._commands = (JointStateDecoder() for _ in range(3))
         self._take: dict[str, Callable[[bytes, int], None]] = {
@@ -145,6 +163,7 @@ class CharacterTimeline:
             _CONTROLLER: self._take_controller,
             _MODE: self._take_mode,
             _PLAN: self._take_plan,
+            _CONTROLLER_KEYFRAME: self._take_keyframe,
         }
 
     @property
@@ -191,9 +210,9 @@ class CharacterTimeline:
             self.begins_amid, amid, self._amid = True, self._amid, []
             for raw, published_ns in amid:
                 self._take_state(raw, published_ns)
-        if self._gaps:
-            ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self._gaps[:_MOST_NAMED]]
-            more = len(self._gaps) - _MOST_NAMED
+        if self.gaps:
+            ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self.gaps[:_MOST_NAMED]]
+            more = len(self.gaps) - _MOST_NAMED
             tail = f" and {more} more times" if more > 0 else ""
             raise RecordingError(f"the states of ticks {', '.join(ranges)}{tail} are missing")
         assert self.rebuilt is not None
@@ -227,14 +246,18 @@ class CharacterTimeline:
             raise RecordingError(f"the states are not those of {name}: {error}") from error
         tick, states = self._clock.tick(state.stamp_ns), self.states
         if not states.stamps_ns:
-            if state.effort is not None and not self.begins_amid:
+            if state.stamp_ns < self._begins.first_ns:
+                return
+            is_begin = state.effort is None or state.stamp_ns in self._begins.keyframes
+            if not is_begin and not self.begins_amid:
                 self._amid.append((raw, published_ns))
                 return
         elif tick <= self._last_tick:
+            self.repeated += 1
             self._check_repeated(tick, state.position.tobytes() + state.velocity.tobytes())
             return
         elif tick > self._last_tick + 1:
-            self._gaps.append((self._last_tick + 1, tick - 1))
+            self.gaps.append((self._last_tick + 1, tick - 1))
         self._last_tick = tick
         states.stamps_ns.append(state.stamp_ns)
         states.published_ns.append(published_ns)
@@ -247,7 +270,7 @@ class CharacterTimeline:
         row, size = tick - self._clock.tick(self.states.stamps_ns[0]), self._layout.size
         entries = slice(row * size, (row + 1) * size)
         known = self.states.position[entries].tobytes() + self.states.velocity[entries].tobytes()
-        if row >= 0 and not self._gaps and content != known:
+        if row >= 0 and not self.gaps and content != known:
             raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
     def _take_reference(self, raw: bytes, published_ns: int) -> None:
@@ -275,6 +298,10 @@ class CharacterTimeline:
             parameters = dict(content["parameters"])
             since_ns = content.get(SINCE)
             self.controller.append(NodeParameters(parameters, since_ns))
+
+    def _take_keyframe(self, raw: bytes, published_ns: int) -> None:
+        stamp_ns, _ = decode_header(raw)
+        self.keyframes[stamp_ns] = raw
 
     def _take_plan(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # raised for a plan of another controller

@@ -76,7 +76,7 @@ class BagWriter:
         self._custom_data = {LOG_TIME: SIMULATED} if self._is_simulated else {}
         self._schemas: dict[str, int] = {}  # by the type's name
         self._channels: dict[str, int] = {}  # by topic
-        self._topics: list[dict[str, object]] = []  # for the metadata
+        self._topics: list[dict[str, object]] = []  # the metadata's entries
         self._counts = Counter[str]()
         self._span_ns = (LATEST_NS, 0)  # first and last log time
         try:
@@ -189,7 +189,7 @@ class BagWriter:
     def flush(self) -> None:
         """Hand all that was written to the operating system.
 
-        Flushed data outlives this process, however that ends: `actuated_characters recover` makes
+        Flushed data outlives this process, however that ends: `info BAG --recover` makes
         a recording of it. Without it a killed recorder loses up to the last MiB.
 
         Raises:

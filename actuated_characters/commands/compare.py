@@ -15,7 +15,7 @@ from actuated_characters.commands.common.tables import make_table, show
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.report.comparison.comparison import RecordingComparison
+    from actuated_characters.report.comparison import RecordingComparison
 
 _DIFFERENT = 1  # exit code, like that of diff
 _MOST_SECONDS = 20  # seconds that the table has at the most
@@ -57,7 +57,7 @@ def _compare(options: argparse.Namespace) -> int:
     if output is not None and output.suffix.lower() != ".png":
         raise ConfigurationError(f"--output {output}: it must be a .png file")
     from actuated_characters.bags.recording import read_recordings
-    from actuated_characters.report.comparison.comparison import compare, pair
+    from actuated_characters.report.comparison import compare, pair
 
     pairs = pair(read_recordings(options.first), read_recordings(options.second))
     comparisons = [compare(first, second, tolerance) for first, second in pairs]
@@ -67,7 +67,7 @@ def _compare(options: argparse.Namespace) -> int:
     _print_differences(console, "versions", comparisons[0].versions)
     if output is not None:
         from actuated_characters.report.charts import png
-        from actuated_characters.report.comparison.chart import draw_comparisons
+        from actuated_characters.report.comparison import draw_comparisons
         from msgs_config.whole_files import write_whole
 
         write_whole(output, png(draw_comparisons(comparisons)))

@@ -1,9 +1,36 @@
-"""The command `actuated_characters export`: the joint states of a recorded run as a table."""
+"""The command `actuated_characters export`: a run, a bag or a clip as CSV, BVH or glTF."""
 
 import argparse
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from actuated_characters.commands.common.settings import Commands, add_bag, add_command
+from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import (
+    Commands,
+    add_command,
+    add_robot,
+    print_remarks,
+    robot_source,
+)
+from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.whole_files import write_whole
+
+if TYPE_CHECKING:  # it takes a while to import
+    from character_motion.export.trajectories import Trajectories
+    from msgs_config.arrays import FloatArray
+
+_CSV, _BVH, _GLTF = "CSV", "BVH", "glTF"
+_BINARY = ".glb"
+_FORMATS = {".csv": _CSV, ".bvh": _BVH, _BINARY: _GLTF, ".gltf": _GLTF}
+_KNOWN_TO = {  # the formats of options that not every format has
+    "reference": (_CSV,),
+    **dict.fromkeys(("from", "to", "fps"), (_BVH, _GLTF)),
+    **dict.fromkeys(("units", "order"), (_BVH,)),
+    "ground": (_GLTF,),
+}
+_CENTIMETRES = 100.0  # in a metre
+_ORDERS = ("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX")
 
 
 def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -12,31 +39,162 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         commands,
         _export,
         "export",
-        "write a recorded run's joint states as CSV",
-        "Write the joint states of a recorded run as CSV, one row a state: time_s (since the first "
-        "state), stamp_ns, episode (from 1), then position.DOF (rad or m), velocity.DOF (rad/s or "
-        "m/s) and effort.DOF (N m or N, applied in the tick before the state; empty where there "
-        "was none) of each degree of freedom. Numbers are read back to the last bit.",
-        ["export runs/demo --output demo.csv"],
+        "write a run, a bag or a clip as CSV, BVH or glTF",
+        "Write a recorded run or a clip as the suffix of --output says. .csv has one row a state: "
+        "time_s (since the first state), stamp_ns, episode (from 1), then position.DOF (rad or "
+        "m), velocity.DOF (rad/s or m/s) and effort.DOF (N m or N, applied in the tick before the "
+        "state; empty where there was none) of each degree of freedom, read back to the last bit; "
+        "of a clip time_s and positions. .bvh is the skeleton of one character; .glb (binary) and "
+        ".gltf (text) are all characters with their shapes and colours, and thrown balls. Both "
+        "are y up, forward is z.",
+        [
+            "export runs/demo --output demo.csv",
+            "export runs/demo --output demo.glb",
+            "export walk --output walk.bvh --units cm",
+            "export runs/demo --topic description_joint_states --output robot.glb",
+        ],
     )
-    add_bag(export)
-    export.add_argument("--output", type=Path, required=True, metavar="FILE.csv")
-    export.add_argument("--character", metavar="NAME", help="which, where there are several")
+    export.add_argument(
+        "source",
+        metavar="SOURCE",
+        help="a run's directory, a bag, or a clip: its name, or a .txt or .json file",
+    )
+    export.add_argument(
+        "--output", type=Path, required=True, metavar="FILE", help=f"a {_suffixes()} file"
+    )
+    export.add_argument("--overwrite", action="store_true", help="replace FILE")
+    add_robot(
+        export,
+        "of a recording: which, where there are several; of a clip: whose it is (humanoid)",
+    )
+    _add_options_of_formats(export)
+
+
+def _add_options_of_formats(export: argparse.ArgumentParser) -> None:
+    """Add the options of `_KNOWN_TO`."""
     export.add_argument(
         "--reference",
         action="store_true",
-        help="reference_position.DOF and reference_velocity.DOF, too; empty where there was none",
+        help="CSV of a run: reference_position.DOF and reference_velocity.DOF, too; empty where "
+        "there was none",
     )
-    export.add_argument("--overwrite", action="store_true", help="replace FILE.csv")
+    export.add_argument("--from", type=float, metavar="S", help="BVH, glTF: start, s (0)")
+    export.add_argument("--to", type=float, metavar="S", help="BVH, glTF: end, s (the last state)")
+    export.add_argument(
+        "--fps",
+        type=float,
+        metavar="HZ",
+        help="BVH, glTF: frames a second (a clip's own; of a recording its rate, divided to 60 or "
+        "less)",
+    )
+    export.add_argument("--units", choices=("m", "cm"), help="BVH: unit of length (m)")
+    export.add_argument("--order", choices=_ORDERS, help="BVH: order of rotation channels (ZXY)")
+    export.add_argument("--ground", action="store_true", help="glTF: the plane z = 0, too")
+
+
+def _suffixes() -> str:
+    *first, last = _FORMATS
+    return f"{', '.join(first)} or {last}"
 
 
 def _export(options: argparse.Namespace) -> None:
-    from actuated_characters.bags.recording import read_recording
-    from actuated_characters.report.joint_table import check_output, write_joint_states
+    kind = _FORMATS.get(options.output.suffix.lower())
+    if kind is None:
+        raise ConfigurationError(f"--output {options.output}: it must be a {_suffixes()} file")
+    for name, kinds in _KNOWN_TO.items():
+        value = getattr(options, name)
+        if value is not None and value is not False and kind not in kinds:
+            raise ConfigurationError(
+                f"--{name} is of {' and '.join(kinds)}; {options.output} is none"
+            )
+    _check_output(options.output, overwrite=options.overwrite)
+    (_write_table if kind == _CSV else _write_motion)(options, kind)
 
-    check_output(options.output, overwrite=options.overwrite)
-    recording = read_recording(options.bag, options.character)
-    write_joint_states(
-        recording, options.output, reference=options.reference, overwrite=options.overwrite
-    )
+
+def _check_output(file: Path, *, overwrite: bool) -> None:
+    """Raise RecordingError if a file must not be written, as can be known before all the work."""
+    if file.is_dir():
+        raise RecordingError(f"cannot write {file}: it is a directory")
+    if not file.absolute().parent.is_dir():
+        raise RecordingError(f"cannot write {file}: its directory does not exist")
+    if file.exists() and not overwrite:
+        raise RecordingError(f"{file} exists already; --overwrite replaces it")
+
+
+def _check_alone(names: Sequence[str], kind: str) -> None:
+    """Raise ConfigurationError if there are several characters, for a format that has one."""
+    if len(names) > 1:
+        raise ConfigurationError(
+            f"{kind} has one character; name one by --character: {', '.join(names)}"
+        )
+
+
+def _write_table(options: argparse.Namespace, kind: str) -> None:
+    from actuated_characters.export.joint_table import write_clip, write_joint_states
+    from actuated_characters.export.sources import read_recorded, read_source
+
+    robot = robot_source(options)
+    recordings = read_recorded(options.source, robot, print_remarks)
+    _check_alone([each.name for each in recordings], kind)
+    if recordings:
+        write_joint_states(recordings[0], options.output, reference=options.reference)
+    elif options.reference:
+        raise ConfigurationError(f"--reference is of a run; {options.source} is none")
+    else:
+        write_clip(read_source(options.source, robot), options.output)
     print(options.output)
+
+
+def _write_motion(options: argparse.Namespace, kind: str) -> None:
+    from actuated_characters.export.sources import read_source
+
+    motion = read_source(options.source, robot_source(options), print_remarks)
+    start = getattr(options, "from")
+    times = motion.sample_times(0.0 if start is None else start, options.to, options.fps)
+    names = [each.name for each in motion.characters]
+    if kind == _BVH:
+        _check_alone(names, kind)
+    if options.ground and not motion.has_plane:
+        raise ConfigurationError(
+            "--ground: the world of the recording has no plane, and another terrain is left out"
+        )
+    total = len(times) * len(motion.characters)
+    with progress_bar(options.output.name, total, "frames", transient=True) as bar:
+        content = (_bvh if kind == _BVH else _gltf)(
+            options, motion, times, lambda done: bar.update(bar.task_ids[0], completed=done)
+        )
+    write_whole(options.output, content)
+    print(
+        f"{options.output}: {', '.join(names)}, {len(times)} frames over "
+        f"{times[-1] - times[0]:.2f} s, {len(content) / 1e6:.1f} MB"
+    )
+
+
+def _gltf(
+    options: argparse.Namespace,
+    motion: "Trajectories",
+    times: "FloatArray",
+    progress: Callable[[int], None],
+) -> bytes:
+    from actuated_characters.export.gltf_scene import make_document
+
+    document = make_document(motion, times, ground=options.ground, progress=progress)
+    is_binary = options.output.suffix.lower() == _BINARY
+    return document.to_glb() if is_binary else document.to_gltf()
+
+
+def _bvh(
+    options: argparse.Namespace,
+    motion: "Trajectories",
+    times: "FloatArray",
+    progress: Callable[[int], None],
+) -> bytes:
+    from character_motion.bvh.writing import bvh_text
+    from character_motion.export.bvh_motion import to_bvh
+
+    (trajectory,) = motion.characters
+    rate = motion.rate if options.fps is None else options.fps
+    poses = motion.link_poses(trajectory, times, progress)
+    scale = _CENTIMETRES if options.units == "cm" else 1.0
+    written = to_bvh(trajectory.character, poses, rate, options.order or _ORDERS[0], scale)
+    return bvh_text(written).encode()

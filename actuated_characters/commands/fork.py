@@ -66,6 +66,12 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
         metavar="DIR",
         help="where the results go (RUN-fork, with a number if it exists)",
     )
+    fork.add_argument(
+        "--from-start",
+        action="store_true",
+        help="repeat, and record, the whole past; else only what follows the last keyframe before "
+        "--at, which the recording has every few seconds",
+    )
     fork.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
     fork.add_argument(
         "--through-topics",
@@ -94,7 +100,9 @@ def _fork(options: argparse.Namespace) -> None:
         raise ConfigurationError(f"--output {directory} is the run that is forked")
     settings = node_settings(options.set, NODES)
     inputs = ForkInputs(settings, options.push, options.throw, not options.no_later_inputs)
-    planned = plan_fork(options.bag, options.at, inputs, options.duration)
+    planned = plan_fork(
+        options.bag, options.at, inputs, options.duration, from_start=options.from_start
+    )
     if options.output is None and not options.overwrite:
         directory = prepare_free_directory(directory)
     else:

@@ -1,21 +1,26 @@
 """The command `actuated_characters info`: the contents of a bag."""
 
 import argparse
+import json
+import math
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from actuated_characters.commands.common.recovering import recover_bag
 from actuated_characters.commands.common.settings import Commands, add_bag, add_command
-from actuated_characters.commands.common.tables import make_facts_table, make_table
+from actuated_characters.commands.common.tables import make_facts_table, make_table, show
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.report.facts import BagFacts, RunFacts, StreamFacts
+    from actuated_characters.report.contents import CharacterContents, Contents
+    from actuated_characters.report.ticks import TickFacts
 
-_MOST_LISTED = 12  # gaps, pauses, episodes, pushes and changes of each kind; --json has all
+_MOST_LISTED = 12  # gaps, pauses and events; --json has all
 _NS_PER_S = 10**9
 _SIZES = ("B", "kB", "MB", "GB")
 
@@ -27,43 +32,66 @@ def add_info(commands: "Commands[argparse.ArgumentParser]") -> None:
         _info,
         "info",
         "say what is in a bag",
-        "Say what is in a bag: files, topics with rates and gaps; and of each character ticks, "
-        "missing and late ones, episodes, pauses, gains in force, pushes, saturation. Of a bag of "
-        "something else, the topics.",
-        ["info runs/demo"],
+        "Say what is in a bag: files, topics with counts and rates, and each character with its "
+        "law and gains. That is known without reading the messages, however many there are. Of a "
+        "bag of something else, the topics.",
+        ["info runs/demo", "info runs/demo --ticks"],
     )
     add_bag(info)
+    info.add_argument(
+        "--ticks",
+        action="store_true",
+        help="read each message, too: missing and late ticks, gaps between messages, pauses, what "
+        "happened (pushes, throws, resets, modes, changed parameters, a fall), joints at their "
+        "limits, errors of plans",
+    )
     info.add_argument("--json", action="store_true", help="print all of it as JSON")
+    info.add_argument(
+        "--recover",
+        action="store_true",
+        help="first make the bag complete, where its recorder was killed, the disk was full or a "
+        "copy broke off; the old one is kept beside it as BAG.damaged, and a run gets the figures "
+        "that it lacks. A complete bag is not touched",
+    )
 
 
 def _info(options: argparse.Namespace) -> None:
-    from actuated_characters.report.facts import as_json, look_at
+    from actuated_characters.report.contents import read_contents
 
-    facts = look_at(options.bag)
+    if options.recover:
+        recover_bag(options.bag)
+    contents, ticks = read_contents(options.bag), list["TickFacts"]()
+    if options.ticks:
+        from actuated_characters.report.ticks import read_ticks
+
+        contents, ticks = read_ticks(contents)
     if options.json:
-        print(as_json(facts))
+        runs = [asdict(run) for run in ticks] if options.ticks else None
+        content = _finite({**asdict(contents), "runs": runs})
+        print(json.dumps(content, indent=2, allow_nan=False))
         return
     console = Console()
-    console.print(make_facts_table(str(facts.contents.bag), _bag_rows(facts)))
-    console.print(_topics_table(facts))
-    runs = {run.name: run for run in facts.runs}
-    for stream in facts.streams:
-        if stream.rate_hz is not None:
-            console.print(_character_table(stream, runs.get(stream.name)))
-    for run in facts.runs:
-        if run.gains:
-            console.print(_gains_table(run))
-    if facts.lacks is not None:
-        console.print(f"no more than that: {facts.lacks}", soft_wrap=True, markup=False)
+    console.print(make_facts_table(contents.bag, _bag_rows(contents, options.ticks)))
+    console.print(_topics_table(contents))
+    for character in contents.characters:
+        rows = _character_rows(character)
+        console.print(make_facts_table(_title(character.name, character.character), rows))
+        if character.gains:
+            console.print(_gains_table(character))
+    for run in ticks:
+        console.print(make_facts_table(_title(run.name, "ticks"), _tick_rows(run)))
+    if contents.lacks is not None:
+        console.print(f"no more than that: {contents.lacks}", soft_wrap=True, markup=False)
 
 
-def _bag_rows(facts: "BagFacts") -> Iterator[tuple[str, str]]:
-    from actuated_characters.report.facts import longest_sim_time
+def _title(name: str, what: str) -> str:
+    return f"{name}: {what}" if name else what
 
-    contents = facts.contents
+
+def _bag_rows(contents: "Contents", exact: bool) -> Iterator[tuple[str, str]]:
     files = ", ".join(f"{name} ({_size(size)})" for name, size in contents.files.items())
-    yield "files", f"{_size(sum(contents.files.values()))}: {files}"
-    version = "unknown" if contents.version is None else str(contents.version)
+    yield "files", f"{_size(contents.size_bytes)}: {files}"
+    version = "unknown" if contents.metadata_version is None else str(contents.metadata_version)
     yield (
         "storage",
         f"{contents.storage}, compression {contents.compression}, metadata version {version}, "
@@ -74,107 +102,73 @@ def _bag_rows(facts: "BagFacts") -> Iterator[tuple[str, str]]:
     if contents.start_ns is not None:
         start = datetime.fromtimestamp(contents.start_ns // _NS_PER_S, tz=UTC)
         yield "begun", start.strftime("%Y-%m-%d %H:%M:%S UTC")
-    wall_time = contents.wall_time
-    unknown = "unknown, log times are simulated and SQLite has no others"
-    yield "wall time", unknown if wall_time is None else f"{wall_time:.6g} s"
-    sim_time = longest_sim_time(facts)
-    yield "simulated time", "unknown" if sim_time is None else f"{sim_time:.6g} s"
+    unknown = "unknown, log times are simulated; of MCAP --ticks reads the others"
+    yield "wall time", _seconds(contents.wall_time_s) or unknown
+    about = "" if exact or contents.sim_time_s is None else "about "
+    yield "simulated time", about + (_seconds(contents.sim_time_s) or "unknown")
 
 
-def _topics_table(facts: "BagFacts") -> Table:
-    from actuated_characters.report.facts import longest_sim_time
-
-    sim_time = longest_sim_time(facts)
-    rows = [
-        (
-            Text.assemble(topic.name, "\n  ", (topic.type_name, "dim")),
-            topic.count,
-            "-" if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
-            f"{topic.count / sim_time:.4g}" if sim_time else "-",
-            "-" if topic.largest_gap is None else f"{topic.largest_gap:.4g}",
-        )
-        for topic in facts.contents.topics
-    ]
-    columns = ("name and type", "count", "per s", "per sim. s", "gap (s)")
-    return make_table("topics, with the largest gap", columns, rows)
+def _seconds(time: float | None) -> str:
+    return "" if time is None else f"{time:.6g} s"
 
 
-def _character_table(stream: "StreamFacts", run: "RunFacts | None") -> Table:
-    named = f"{stream.name}: " if stream.name else ""
-    rows = [*_stream_rows(stream), *(() if run is None else _run_rows(run))]
-    if stream.versions:
-        rows.append(("versions", ", ".join(map(" ".join, stream.versions.items()))))
-    return make_facts_table(f"{named}{stream.character or 'unknown'}", rows)
+def _topics_table(contents: "Contents") -> Table:
+    columns = ["name and type", "count", "per s", "per sim. s"]
+    if any(topic.largest_gap_s is not None for topic in contents.topics):
+        columns.append("largest gap (s)")
+    rows = []
+    for topic in contents.topics:
+        times = (contents.wall_time_s, contents.sim_time_s)
+        rates = (topic.count / time if time else None for time in times)
+        numbers = (topic.count, *rates, topic.largest_gap_s)
+        name = Text.assemble(topic.name, "\n  ", (topic.type, "dim"))
+        rows.append([name, *map(show, numbers[: len(columns) - 1])])
+    return make_table("topics", columns, rows)
 
 
-def _stream_rows(stream: "StreamFacts") -> Iterator[tuple[str, str]]:
-    """A character's states: how many, when, and which are missing."""
-    yield "character", _character_line(stream)
-    if stream.ticks is not None:
-        again = f", {stream.repeated} published again" if stream.repeated else ""
-        time = f", {stream.sim_time:.6g} s" if stream.sim_time is not None else ""
-        yield "ticks", f"{stream.ticks}{time}{again}"
-        yield "missing ticks", _missing_line(stream)
-    if stream.tick_us:
-        yield "from tick to tick", _times_line(stream.tick_us)
-    if stream.late:
-        times = _times_line(stream.late)
-        lateness = f"; lateness {times}, pauses left out" if times else ""
-        yield "late ticks", f"{int(stream.late['ticks'])} by more than a period{lateness}"
-    pauses = (f"{p.duration:.3g} s of wall time at {p.start:.4g} s" for p in stream.pauses)
-    yield "pauses", _listed(pauses)
-
-
-def _run_rows(run: "RunFacts") -> Iterator[tuple[str, str]]:
-    """A character's run: episodes, law, and what acted on it."""
-    from actuated_characters.report.reactions import mode_line, thrown_line
-
-    episodes = (f"{e.duration:.4g} s from {e.start:.4g} s on" for e in run.episodes)
-    yield "episodes", _listed(episodes)
-    yield "resets", str(run.resets)
-    yield "law", run.law or "not recorded"
-    changes = (f"{c.line} after {c.time:.4g} s" for c in run.changes)
-    yield "changed meanwhile", _listed(changes)
-    pushes = (
-        f"{push.link} at {push.start:.4g} s for {push.duration:.3g} s: up to "
-        f"{push.largest_force:.4g} N, {push.impulse:.4g} N s"
-        for push in run.pushes
+def _character_rows(character: "CharacterContents") -> Iterator[tuple[str, str]]:
+    yield (
+        "character",
+        f"{character.character}, {character.degrees_of_freedom} degrees of freedom, "
+        f"{character.mass:.4g} kg, {character.rate_hz} Hz, {character.mode or 'mode unknown'}",
     )
-    yield "pushes", _listed(pushes) if run.pushes_recorded else "not recorded"
-    yield "throws", _listed(f"at {each.start:.4g} s: {thrown_line(each)}" for each in run.throws)
-    yield "modes", _listed(f"at {span.start:.4g} s: {mode_line(span)}" for span in run.modes)
-    shares = {name: share for name, share in run.saturated_shares.items() if share > 0.0}
-    yield "at the limit", _listed(f"{n} {100.0 * s:.3g} %" for n, s in shares.items())
-    recorded = {"reference": run.reference, "contacts": run.contacts}
-    absent = [topic for topic, is_there in recorded.items() if not is_there]
-    if absent:
-        yield "not recorded", ", ".join(absent)
+    yield "states", str(character.states)
+    yield "law", character.law or "not recorded"
+    if character.versions:
+        yield "versions", ", ".join(map(" ".join, character.versions.items()))
 
 
-def _gains_table(run: "RunFacts") -> Table:
-    title = "gains and limits in force at the start"
+def _gains_table(character: "CharacterContents") -> Table:
     rows = [
         (row.joint, *("-" if v is None else f"{v:g}" for v in (row.p, row.d, row.i, row.limit)))
-        for row in run.gains
+        for row in character.gains
     ]
-    columns = ("joint", "p", "d", "i", "limit")
-    return make_table(f"{run.name}: {title}" if run.name else title, columns, rows)
+    title = _title(character.name, "gains and limits in force at the start")
+    return make_table(title, ("joint", "p", "d", "i", "limit"), rows)
 
 
-def _character_line(stream: "StreamFacts") -> str:
-    parts = [stream.character or "unknown"]
-    if stream.degrees_of_freedom is not None:
-        parts.append(f"{stream.degrees_of_freedom} degrees of freedom")
-    if stream.mass is not None:
-        parts.append(f"{stream.mass:.4g} kg")
-    return ", ".join([*parts, f"{stream.rate_hz} Hz", stream.mode or "mode unknown"])
-
-
-def _missing_line(stream: "StreamFacts") -> str:
-    if not stream.missing:
-        return "none"
-    gaps = (str(a) if a == b else f"{a} to {b}" for a, b in stream.missing)
-    return f"{stream.missing_count}: {_listed(gaps, separator=', ')}"
+def _tick_rows(run: "TickFacts") -> Iterator[tuple[str, str]]:
+    again = f", {run.repeated} states published again" if run.repeated else ""
+    yield "ticks", f"{run.ticks}, {_seconds(run.sim_time_s)}{again}"
+    gaps = (str(a) if a == b else f"{a} to {b}" for a, b in run.missing)
+    listed = _listed(gaps, separator=", ")
+    yield "missing ticks", f"{run.missing_count}: {listed}" if run.missing else "none"
+    if run.tick_us:
+        yield "from tick to tick", _times_line(run.tick_us)
+    if run.late:
+        times = _times_line(run.late)
+        lateness = f"; lateness {times}, pauses left out" if times else ""
+        yield "late ticks", f"{int(run.late['ticks'])} by more than a period{lateness}"
+    pauses = (f"{p.duration:.3g} s of wall time at {p.start:.4g} s" for p in run.pauses)
+    yield "pauses", _listed(pauses)
+    yield "events", _listed(f"at {event.start:.4g} s: {event.text}" for event in run.events)
+    shares = {name: share for name, share in run.saturated_shares.items() if share > 0.0}
+    yield "at the limit", _listed(f"{name} {100.0 * s:.3g} %" for name, s in shares.items())
+    if run.plan_errors:
+        errors = (f"{error:.3g} m after {t:.3g} s" for t, error in run.plan_errors.items())
+        yield "plans, off by", _listed(errors)
+    if run.absent:
+        yield "not recorded", ", ".join(run.absent)
 
 
 def _times_line(times: dict[str, float]) -> str:
@@ -198,3 +192,12 @@ def _size(size: float) -> str:
     while size >= 1000.0 and unit < len(_SIZES) - 1:
         size, unit = size / 1000.0, unit + 1
     return f"{size:.3g} {_SIZES[unit]}"
+
+
+def _finite(value: Any) -> Any:
+    """The value as JSON can say it: an unknown or infinite number is null."""
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

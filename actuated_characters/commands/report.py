@@ -24,11 +24,12 @@ def add_report(commands: "Commands[argparse.ArgumentParser]") -> None:
         commands,
         _report,
         "report",
-        "draw a recorded run's figures as a page",
-        "Draw the tracking error of each joint, the torques against their limits, the root's path "
-        "against the reference, contacts, and tick times, with pushes, resets and changed "
-        "parameters marked: an HTML page that needs nothing beside itself, and its pictures as PNG "
-        "files.",
+        "say on a page how a recorded run went",
+        "Write a page on how a run went: a verdict, the character at moments side by side, the "
+        "tracking error of each joint, torques against their limits, contacts, and what happened "
+        "(pushes, throws, resets, changed parameters, a fall). It is HTML that needs nothing "
+        "beside itself; its pictures are PNG files, too. `view` shows the motion, `info --ticks` "
+        "the times.",
         [
             "report runs/demo",
             "report runs/demo --topic description_joint_states --output robot-report",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.parameter_list import print_parameters
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.run_options import (
     ALL_SENSORS,
@@ -63,6 +64,11 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "option: say what there is to run.",
         ["run --clip walk --set controller_node.gain_scale.p:=0.5"],
     )
+    run.add_argument(
+        "--parameters",
+        choices=(*NODES, "recorder"),
+        help="list this node's parameters, with the values that the run would have, and end",
+    )
     add_character(run)
     add_tracked(run)
     run.add_argument(
@@ -104,12 +110,16 @@ def _run(options: argparse.Namespace) -> None:
     )
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
 
+    if options.parameters is not None:
+        plan = planned_run(options).plan
+        print_parameters(options.parameters, plan, _recording(options, plan))
+        return
     if options.view:
         require_extra("view", "--view")
     if not options.in_process:
         require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)
-    plan, motion = run.plan, _motion_name(run.plan)
+    plan, motion = run.plan, run.plan.motion_name
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     if options.output is None and not options.overwrite:
@@ -262,14 +272,6 @@ def _run_plan(
     )
     has_states = throws and not options.no_record
     return describe_hits(plan, throws, read_states(directory) if has_states else None)
-
-
-def _motion_name(plan: "RunPlan") -> str:
-    """The name of the motion that a plan tracks."""
-    if plan.controller.text("behaviour") == "state_machine":
-        return plan.controller.text("machine")
-    kind = plan.controller.text("reference")
-    return plan.controller.text(kind) if kind in ("clip", "keyframes") else kind
 
 
 def _reference(options: argparse.Namespace) -> dict[str, object]:

@@ -13,12 +13,10 @@ from actuated_characters.commands.common.settings import (
     print_remarks,
     robot_source,
 )
-from actuated_characters.viewer.parameters import PARAMETERS as SERVER_PARAMETERS
+from actuated_characters.viewer.parameters import ViewerSettings
 from msgs_config.errors import ConfigurationError
 from msgs_config.extras import require_extra
-from msgs_config.parameters import resolve
 
-_FPS = 30.0
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MODULE = "actuated_characters.viewer.main"
 
@@ -57,17 +55,21 @@ def add_server(command: argparse._ActionsContainer) -> None:
     """Add the options that say where the viewer's page is."""
     command.add_argument(
         "--host",
-        default="127.0.0.1",
+        default=ViewerSettings.host,
         metavar="ADDRESS",
         help="listen on this address; others than %(default)s let others watch and push",
     )
     command.add_argument(
-        "--port", type=int, default=0, metavar="N", help="listen on this port (8080, or the next)"
+        "--port",
+        type=int,
+        default=ViewerSettings.port,
+        metavar="N",
+        help="listen on this port (8080, or the next)",
     )
     command.add_argument(
         "--fps",
         type=float,
-        default=_FPS,
+        default=ViewerSettings.fps,
         metavar="HZ",
         help="most pictures a second (%(default)g)",
     )
@@ -104,7 +106,7 @@ def _view(options: argparse.Namespace) -> None:
 def _view_recorded(options: argparse.Namespace) -> None:
     if options.namespace is not None:
         raise ConfigurationError("--namespace is of running simulators; a RUN has none")
-    values = resolve(SERVER_PARAMETERS, server_parameters(options))
+    settings = ViewerSettings.given(server_parameters(options))
     from actuated_characters.viewer.recorded.main import show_recorded
 
     show_recorded(
@@ -112,7 +114,7 @@ def _view_recorded(options: argparse.Namespace) -> None:
         options.others,
         robot_source(options),
         print_remarks,
-        host=values.text("host"),
-        port=values.integer("port") or None,
-        fps=values.number("fps"),
+        host=settings.host,
+        port=settings.port or None,
+        fps=settings.fps,
     )

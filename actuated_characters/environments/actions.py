@@ -11,7 +11,7 @@ from controller_node.controller_settings import ControllerSettings, effective_ga
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
@@ -106,7 +106,8 @@ class TargetActuation:
             lower[self._actuated], upper[self._actuated], dtype=np.float64
         )
         self._offset: FloatArray | None = None  # (n,); None: nothing is added, not even a zero
-        self._target: GeneralizedPosition | None = None  # in place of the reference's position
+        # Takes the place of the reference's position.
+        self._target: GeneralizedPosition | None = None
 
     def hold(self, action: FloatArray) -> None:
         """Hold offsets or positions (a,)."""

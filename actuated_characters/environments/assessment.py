@@ -21,8 +21,8 @@ from msgs_config.geometry import fixed_order, scalars
 from msgs_config.messages.state import StampedState
 
 Terrain: TypeAlias = UrdfOptions | None
-_DOWN = (0.0, 0.0, -1.0)
-_BASE = 6  # entries of a floating base
+_DOWNWARDS = (0.0, 0.0, -1.0)
+_BASE_DOFS = 6  # entries of a floating base
 _OF_BASE = 10  # numbers in an observation: height, gravity, velocity, angular velocity
 
 
@@ -47,9 +47,9 @@ class Assessment:
         self.fall = None if reader is None else FallWatch(reader, step_rate_hz)
         """Watches the states that are judged for a fall; None where there is none."""
         self._floats = character.layout.has_floating_base
-        self._joints = slice(_BASE if self._floats else 0, None)
+        self._joints = slice(_BASE_DOFS if self._floats else 0, None)
         size = character.layout.size
-        joints = size - (_BASE if self._floats else 0)
+        joints = size - (_BASE_DOFS if self._floats else 0)
         self._parts = np.cumsum([_OF_BASE * self._floats, joints, joints, size, size]).tolist()
 
     @property
@@ -62,11 +62,11 @@ class Assessment:
         base, position, velocity, error, _ = self._parts
         seen = np.empty(self.size)
         if self._floats:
-            axes = scalars.axes(scalars.exp(state.position[3:_BASE].tolist()))
+            axes = scalars.axes(scalars.exp(state.position[3:_BASE_DOFS].tolist()))
             seen[0] = state.position[2]
-            seen[1:4] = scalars.to_child(axes, _DOWN)
+            seen[1:4] = scalars.to_child(axes, _DOWNWARDS)
             seen[4:7] = scalars.to_child(axes, state.velocity[:3].tolist())
-            seen[7:base] = state.velocity[3:_BASE]
+            seen[7:base] = state.velocity[3:_BASE_DOFS]
         seen[base:position] = state.position[self._joints]
         seen[position:velocity] = state.velocity[self._joints]
         seen[velocity:error] = self._error(state, ahead)

@@ -9,7 +9,7 @@ from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 
 
 class FollowingCamera:

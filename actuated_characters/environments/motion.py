@@ -4,7 +4,8 @@ from controller_node.references.base import Reference, ReferenceState, SampledTo
 from msgs_config.messages.clock import TickClock
 
 _BATCH_TICKS = 64  # ticks that are sampled at once
-_KEPT = 4  # batches that are kept: of the past, of the present, and of what is looked ahead to
+# Batches are kept of the past, of the present, and of what is looked ahead to.
+_MAX_BATCHES = 4
 
 
 class EpisodeMotion:
@@ -25,7 +26,7 @@ class EpisodeMotion:
         number, place = divmod(tick, _BATCH_TICKS)
         if (batch := self._batches.get(number)) is None:
             batch = self._batches[number] = self._sampled(number * _BATCH_TICKS)
-            if len(self._batches) > _KEPT:
+            if len(self._batches) > _MAX_BATCHES:
                 del self._batches[next(iter(self._batches))]
         return batch[place]
 

@@ -41,7 +41,7 @@ from msgs_config.errors import ConfigurationError, SimulationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import collides, placed
+from msgs_config.shared_parameters import SharedSettings, collides, placed
 
 if TYPE_CHECKING:
     from actuated_characters.environments.camera import FollowingCamera
@@ -123,9 +123,10 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._character = placed(load_character(character, collides(simulator)), simulator)
         values = controller_values(self._character, given)
         motion = make_motion(self._character, values)
-        clock = TickClock(values.integer("rate"))
+        shared = SharedSettings.of(values)
+        clock = TickClock(shared.rate)
         self._motion = EpisodeMotion(motion.reference, clock)
-        model = DynamicsModel(self._character, values.number("gravity"))
+        model = DynamicsModel(self._character, shared.gravity)
         check_inertia(model, self._character)
         self._actuation = self._make_actuation(action, values, model, clock)
         self.action_space = self._actuation.space
@@ -138,7 +139,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
             model,
             clock.rate_hz / ticks_per_step,
             world.terrain,
-            falls=values.number("gravity") > 0.0 and (world.ground or world.terrain is not None),
+            falls=shared.gravity > 0.0 and (world.ground or world.terrain is not None),
         )
         self.observation_space = gymnasium.spaces.Box(
             -np.inf, np.inf, (self._assessment.size,), dtype=np.float64

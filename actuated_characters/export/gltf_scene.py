@@ -23,8 +23,8 @@ from msgs_config.geometry.surface import Surface
 _GROUND = Shape(ShapeType.BOX, (40.0, 40.0, 0.1), Pose((0.0, 0.0, -0.05)), (0.8, 0.82, 0.85, 1.0))
 _BALL_RGBA: Quadruple = (0.88, 0.37, 0.16, 1.0)
 _GENERATOR = "actuated_characters"
-_TURNING = (JointType.REVOLUTE, JointType.SPHERICAL, JointType.FLOATING)
-_SLIDING = (JointType.PRISMATIC, JointType.FLOATING)
+_ROTATING_JOINTS = (JointType.REVOLUTE, JointType.SPHERICAL, JointType.FLOATING)
+_TRANSLATING_JOINTS = (JointType.PRISMATIC, JointType.FLOATING)
 
 
 def make_document(
@@ -87,9 +87,9 @@ class _SceneBuilder:
             mesh = self._mesh(name, shapes) if shapes else None
             node = self.document.add_node(name, nodes[link.parent + 1], mesh, origins[0], turns[0])
             nodes.append(node)
-            if link.joint.type in _SLIDING:
+            if link.joint.type in _TRANSLATING_JOINTS:
                 self.document.animate(node, "translation", self._times, origins)
-            if link.joint.type in _TURNING:
+            if link.joint.type in _ROTATING_JOINTS:
                 self.document.animate(node, "rotation", self._times, turns)
 
     def add_ball(self, ball: BallTrajectory) -> None:

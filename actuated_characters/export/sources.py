@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.bags.format.storage import SUFFIXES
+from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.robots.reading import RobotSource, read_any
-from actuated_characters.render.scene import Scene, make_scene
+from actuated_characters.render.scene import RecordedScene, make_scene
 from character_motion.export.trajectories import (
     BallTrajectory,
     CharacterTrajectory,
@@ -20,12 +20,13 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import read_clip
-from msgs_config.errors import ClipError, ConfigurationError
+from msgs_config.errors import ClipError, ConfigurationError, RecordingError
+from msgs_config.file_kinds import refuse_other_kind
 
 _CHARACTER = "humanoid"
 _CLIP_SUFFIXES = (".txt", ".json")
 _HIGHEST_RATE = 60.0  # Hz, at which a recording is sampled unless told
-_UNEQUAL = 0.05  # part of a frame's duration by which another may differ
+_DURATION_TOLERANCE = 0.05  # part of a frame's duration by which another may differ
 _AWAY_DISTANCE = 1000.0  # m: a ball farther away has been taken out of the way
 
 
@@ -46,19 +47,31 @@ def read_source(
     Raises:
         ActuatedCharactersError: there is no such source, or it cannot be read.
     """
-    path, robot = Path(source), robot or RobotSource()
-    if path.is_dir() or {*path.suffixes} & {*SUFFIXES.values()}:
-        recordings = read_any(path, robot)
-        told(recordings)
+    robot = robot or RobotSource()
+    recordings = read_recorded(source, robot, told)
+    if recordings:
         return of_recordings(recordings)
     if robot.topic is not None or robot.base is not None:
         raise ConfigurationError(f"--topic and --base are of a bag; {source} is none")
     try:
         return of_clip(load_character(robot.character or _CHARACTER), source)
     except ClipError as error:
-        if path.suffix in _CLIP_SUFFIXES:
+        if Path(source).suffix in _CLIP_SUFFIXES:
             raise
         raise ClipError(f"{source} is no run or bag, nor a clip: {error}") from error
+
+
+def read_recorded(
+    source: str, robot: RobotSource, told: Callable[[Sequence[Recording]], None]
+) -> tuple[Recording, ...]:
+    """The recordings of a run or a bag, none of a clip; arguments and errors: `read_source`."""
+    path, suffixes = Path(source), (*FILE_SUFFIXES, *_CLIP_SUFFIXES)
+    refuse_other_kind(path, "a run, a bag or a clip", suffixes, RecordingError)
+    if not (path.is_dir() or {*path.suffixes} & {*SUFFIXES.values()}):
+        return ()
+    recordings = read_any(path, robot)
+    told(recordings)
+    return recordings
 
 
 def of_clip(character: Character, name_or_path: str) -> Trajectories:
@@ -70,7 +83,7 @@ def of_clip(character: Character, name_or_path: str) -> Trajectories:
     frames = read_clip(character, name_or_path)
     durations = np.diff(frames.times)
     usual = float(np.median(durations))
-    equal = np.abs(durations - usual).max() <= _UNEQUAL * usual
+    equal = np.abs(durations - usual).max() <= _DURATION_TOLERANCE * usual
     rate = len(durations) / float(frames.times[-1]) if equal else round(1.0 / usual)
     configurations = GeneralizedPosition(frames.positions, frames.orientations_xyzw)
     trajectory = CharacterTrajectory(character.name, character, configurations)
@@ -103,7 +116,7 @@ def of_recordings(recordings: Sequence[Recording]) -> Trajectories:
     )
 
 
-def _balls(scene: Scene) -> Iterator[BallTrajectory]:
+def _balls(scene: RecordedScene) -> Iterator[BallTrajectory]:
     """Each ball of each episode."""
     states = scene.recordings[0].balls
     if not states:

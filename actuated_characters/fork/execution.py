@@ -10,15 +10,20 @@ from actuated_characters.fork.node import ForkNode
 from actuated_characters.fork.plan import ForkPlan
 from actuated_characters.recorder.forked_from import KEY
 from actuated_characters.recorder.run_directory import PARAMETERS
-from actuated_characters.replay.players.character_files import write_character, write_urdf
+from actuated_characters.replay.players.character_files import (
+    write_character,
+    write_keyframe,
+    write_urdf,
+)
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import Progress, run_in_process
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
+from msgs_config.messages import topics
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import CHARACTER
+from msgs_config.shared_parameters import CHARACTER, KEYFRAME
 
 
 def run_fork(
@@ -39,7 +44,7 @@ def run_fork(
         _with_files(fork.plan, fork.recording, directory / PARAMETERS),
         directory,
         write_bag=True,
-        progress=progress,
+        progress=lambda ticks: progress(max(ticks - fork.skipped, 0)),
         recording={KEY: fork.origin.to_json(), "sensors": list(fork.sensors)},
         pushes=fork.pushes,
         throws=fork.throws,
@@ -50,13 +55,22 @@ def run_fork(
 
 def _with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
     """A plan whose files have the recorded texts: today's files, or else some that are written."""
-    terrain, changed = recording.world.terrain, dict[str, str]()
+    terrain, both = recording.world.terrain, dict[str, str]()
     if not _is_unchanged(recording):
-        changed[CHARACTER.name] = str(write_character(folder, recording.character))
-    controller = Values(plan.controller | changed)
+        both[CHARACTER.name] = str(write_character(folder, recording.character))
+    controller, simulator = dict(both), dict(both)
     if terrain is not None:
-        changed["terrain"] = str(write_urdf(folder / "terrain.urdf", terrain))
-    return replace(plan, simulator=Values(plan.simulator | changed), controller=controller)
+        simulator["terrain"] = str(write_urdf(folder / "terrain.urdf", terrain))
+    for given, raw, name in (
+        (simulator, recording.keyframe, topics.SIM_NODE),
+        (controller, recording.controller_keyframe, topics.CONTROLLER_NODE),
+    ):
+        given[KEYFRAME.name] = write_keyframe(folder, name, raw)
+    return replace(
+        plan,
+        simulator=Values(plan.simulator | simulator),
+        controller=Values(plan.controller | controller),
+    )
 
 
 def _is_unchanged(recording: Recording) -> bool:
@@ -71,8 +85,8 @@ def _is_unchanged(recording: Recording) -> bool:
 
 
 def describe_new_hits(fork: ForkPlan, directory: Path) -> Sequence[str]:
-    """Of each new throw a few words on whether it hit; none where a reset removed balls."""
-    if not fork.throws or fork.resets:
+    """Of each new throw a few words on whether it hit; none where other balls may be there."""
+    if not fork.throws or fork.resets or fork.skipped:
         return ()
     throws = [*fork.repeated_throws, *fork.throws]
     words = describe_hits(fork.plan, throws, read_states(directory))

@@ -23,7 +23,7 @@ from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.physics.wrenches import ExternalWrench
 
 _MOST_PUSHES = topics.EXTERNAL_WRENCH.quality.depth  # that wait for the simulator, paused
@@ -112,7 +112,7 @@ def begun_pushes(recording: Recording, first: int, end: int) -> list[tuple[int, 
     Raises:
         RecordingError: a push was not held for `wrench_duration`.
     """
-    settings = make_node_settings(simulator_values(recording))
+    settings = NodeSettings.of(simulator_values(recording))
     ordered: list[ExternalWrench] = []
     acting: list[ExternalWrench] = []
     for row in range(first, end):

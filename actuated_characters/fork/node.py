@@ -12,14 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from actuated_characters.bags.recording import read_recording
-from actuated_characters.fork.inputs import ForkPoint, Stop, Stops, recorded_stops
+from actuated_characters.bags.keyframes import KeyframePlace
+from actuated_characters.bags.recording import read_recordings
+from actuated_characters.fork.inputs import ForkPoint, Stop, recorded_stops
 from actuated_characters.replay.comparison import (
     EFFORT,
     POSITION,
     VELOCITY,
     clock_of,
     first_difference,
+    first_tick_of,
 )
 from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
@@ -28,30 +30,38 @@ from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import Turns, ros_node
-from msgs_config.bus.node import BusNode, Publisher, Subscription
+from msgs_config.bus.node import BusNode, Publisher, Subscription, declared_settings
 from msgs_config.errors import ReplayError
 from msgs_config.messages import topics
-from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import SESSION, given_session, read_session
+from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.settings import Settings, parameter
 from msgs_config.versions import describe_changes, installed_versions
 
-PARAMETERS = [
-    Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter("row", 0, "state from which on the fork differs, the first one being 0"),
-    Parameter("ticks", 1, "length of the fork"),
-    Parameter("later_inputs", True, "repeat what was sent from that state on, too"),
-    Parameter("settings", "{}", "new parameters of nodes from that state on, JSON by node"),
-    Parameter("file", "pushes.json", "new pushes, as a run writes them"),
-    Parameter("throws", "throws.json", "new throws, as a run writes them"),
-    Parameter("wait_for_subscribers", 1, "begin when this many subscribe to external_wrench"),
-    Parameter("throw_subscribers", 1, "likewise to throw"),
-    SESSION,
-]
+_LATEST = 2**62  # ns
+
+
+class ForkSettings(Settings):
+    """Which run is forked where, and what is new from there on."""
+
+    recording: str = parameter("", "the bag, or the directory of its run")
+    stamp_ns: int = parameter(
+        0, "of the keyframe that the recording is read from; 0: all", maximum=_LATEST
+    )
+    log_time_ns: int = parameter(0, "of that keyframe in the bag", maximum=_LATEST)
+    row: int = parameter(0, "state from which on the fork differs, the first one being 0")
+    ticks: int = parameter(1, "length of what is repeated and of what is new")
+    later_inputs: bool = parameter(True, "repeat what was sent from that state on, too")
+    settings: str = parameter("{}", "new parameters of nodes from that state on, JSON by node")
+    file: str = parameter("pushes.json", "new pushes, as a run writes them")
+    throws: str = parameter("throws.json", "new throws, as a run writes them")
+    wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
+    throw_subscribers: int = parameter(1, "likewise to throw")
+    session: GivenSession = GivenSession()
+
 
 _PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
@@ -71,32 +81,32 @@ class ForkNode(Player):
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be repeated.
         """
         super().__init__(node or ros_node("fork"), silent=True)
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        path, self._row = Path(values.text("recording")), values.integer("row")
-        self._recording = recording = read_recording(path)
-        point = ForkPoint(self._row, values.integer("ticks"), values.flag("later_inputs"))
+        settings = declared_settings(self.node, ForkSettings)
+        path, self._row = Path(settings.recording), settings.row
+        stamp_ns, log_time_ns = settings.stamp_ns, settings.log_time_ns
+        begin = KeyframePlace(stamp_ns, log_time_ns) if stamp_ns else None
+        self._recording = recording = read_recordings(path, begin)[0]
+        point = ForkPoint(self._row, settings.ticks, settings.later_inputs)
         self._stops = recorded_stops(recording, point)
         pace = float(recording.parameters.get(_PACE) or 0.0)
-        self._tick_clock = clock_of(recording)
-        _add_new(self._stops, self._row, self._tick_clock, pace, values)
+        self._tick_clock, self._first_tick = clock_of(recording), first_tick_of(recording)
+        self._add_new(pace, settings)
         rare = read_rare_messages(path, recording).requests
         self._requests = {row: rare[row] for row in rare if point.repeats(row)}
-        self._session = given_session(values)
+        self._session = settings.session.id
         self._throw_codec = ThrowCodec(self._session)
         self._state_decoder, self._torque_decoder = JointStateDecoder(), JointStateDecoder()
         self._compared = 0  # states
         self._answered_ns = 0  # stamp of the last answer
-        self._open_topics(values)
+        self._open_topics(settings)
 
-    def _open_topics(self, values: Values) -> None:
-        # with the parameters that say how many subscribers to wait for
-        pushed, thrown = "wait_for_subscribers", "throw_subscribers"
+    def _open_topics(self, settings: ForkSettings) -> None:
+        pushed, thrown = settings.wait_for_subscribers, settings.throw_subscribers
         requested = {name for each in self._requests.values() for name, _ in each}
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         self._outgoing: dict[str, tuple[Publisher, int]] = {
-            topic.name: (self.node.publisher(topic), values.integer(count)) for topic, count in sent
+            topic.name: (self.node.publisher(topic), count) for topic, count in sent
         }
         self._clients = {
             topics.SIM_NODE: self.node.client(topics.SIM_NODE, _SERVICES),
@@ -187,7 +197,7 @@ class ForkNode(Player):
             yield from self._call("reset")
 
     def _wait_for_answer(self, row: int, timeout: float = ANSWER_TIMEOUT) -> Turns:
-        stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + row)
+        stamp_ns = self._tick_clock.stamp_ns(self._first_tick + row)
         yield from self.wait(
             lambda: self._answered_ns >= stamp_ns,
             lambda: f"the answer to the state of {stamp_ns} ns",
@@ -209,7 +219,7 @@ class ForkNode(Player):
         """
         while self._states is not None and (raw := self._states.take()) is not None:
             arrays = self._state_decoder.decode(raw)
-            expected_ns = self._tick_clock.stamp_ns(FIRST_TICK + self._compared)
+            expected_ns = self._tick_clock.stamp_ns(self._first_tick + self._compared)
             is_own = read_session(arrays.frame_id) == self._session
             if is_own and arrays.stamp_ns == expected_ns and self._compared <= self._row:
                 self._compare(state_in_layout(self._recording.layout, arrays))
@@ -232,25 +242,24 @@ class ForkNode(Player):
             raise ReplayError("; ".join(filter(None, (str(difference), changed))))
         self._compared += 1
 
+    def _add_new(self, pace: float, settings: ForkSettings) -> None:
+        """Add the new inputs to stops: parameters at the fork, others in their episode.
 
-def _add_new(stops: Stops, row: int, clock: TickClock, pace: float, values: Values) -> None:
-    """Add the new inputs to stops: parameters at the fork, others in the episode that they are in.
+        From the fork on the simulator has the recorded `pace`, unless there is a new one.
+        """
+        stops, row, new = self._stops, self._row, json.loads(settings.settings)
+        if controller := new.get(topics.CONTROLLER_NODE):
+            stops[row].settings.append((topics.CONTROLLER_NODE, controller))
+        simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
+        if simulator:  # its parameters count from the tick on that begins in the state
+            stops[row + 1].settings.append((topics.SIM_NODE, simulator))
+        begins = [row, *(each for each, stop in stops.items() if stop.resets)]
 
-    From the fork on the simulator has the recorded `pace`, unless there is a new one.
-    """
-    new = json.loads(values.text("settings"))
-    if controller := new.get(topics.CONTROLLER_NODE):
-        stops[row].settings.append((topics.CONTROLLER_NODE, controller))
-    simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
-    if simulator:  # its parameters count from the tick on that begins in the state
-        stops[row + 1].settings.append((topics.SIM_NODE, simulator))
-    begins = [row, *(each for each, stop in stops.items() if stop.resets)]
+        def stop_of(planned: Planned) -> Stop:
+            at = self._tick_clock.tick(planned.stamp_ns) - self._first_tick
+            return stops[max(begin for begin in begins if begin <= at) + 1]
 
-    def stop_of(planned: Planned) -> Stop:
-        at = clock.tick(planned.stamp_ns) - FIRST_TICK
-        return stops[max(begin for begin in begins if begin <= at) + 1]
-
-    for push in read_pushes(Path(values.text("file"))):
-        stop_of(push).pushes.append(push)
-    for throw in read_throws(Path(values.text("throws"))):
-        stop_of(throw).throws.append(throw)
+        for push in read_pushes(Path(settings.file)):
+            stop_of(push).pushes.append(push)
+        for throw in read_throws(Path(settings.throws)):
+            stop_of(throw).throws.append(throw)

@@ -21,7 +21,7 @@ AT_LIMIT = 1.0 - 1e-9
 """Share of its limit from which on an effort is at the limit: it was clipped in its direction."""
 
 _CONVERSION_ERROR = 1e-12  # m or rad: more than what conversions of rotations round
-_LOWEST = 0.5  # share of the height of the reference's centre of mass
+_LOST_HEIGHT = 0.5  # share of the height of the reference's centre of mass
 _BLOCK = 8192  # rows that are worked on together, so that long recordings need no more memory
 
 
@@ -133,4 +133,4 @@ def is_lost(centre: FloatArray, desired: FloatArray) -> bool:
     It is beyond 0.6 m, or below half of the desired height.
     """
     is_far = fixed_order.norm(centre - desired) > FARTHEST
-    return bool(is_far or centre[2] < _LOWEST * desired[2])
+    return bool(is_far or centre[2] < _LOST_HEIGHT * desired[2])

@@ -29,10 +29,10 @@ FALLEN_TIME = 0.3
 _UP = np.array((0.0, 0.0, 1.0))
 
 
-class Posture(NamedTuple):
+class PostureSeries(NamedTuple):
     """How high and how upright a body is, in each of r states."""
 
-    height: FloatArray  # (r,) m, of the centre of mass above the ground beneath it
+    height: FloatArray  # (r,) m from the ground to the centre of mass
     up: FloatArray  # (r, 3) unit vectors in the world: the base's axis that points up at rest
 
 
@@ -65,7 +65,7 @@ class PostureReader:
             lowest = math.inf
         return centre - (lowest if math.isfinite(lowest) else character.placement.z)
 
-    def read(self, positions: FloatArray) -> Posture:
+    def read(self, positions: FloatArray) -> PostureSeries:
         """The postures at positions (r, n), message form; NaN where a position is."""
         heights = np.full(len(positions), np.nan)
         up = np.full((len(positions), 3), np.nan)
@@ -77,7 +77,7 @@ class PostureReader:
                 below = 0.0 if ground is None else ground.heights_below(centre[np.newaxis])[0]
                 heights[row] = centre[2] - below
                 up[row] = rotate(exp(turn), self._up_in_base)
-        return Posture(heights, up)
+        return PostureSeries(heights, up)
 
 
 def tilts(up: FloatArray, desired: FloatArray) -> FloatArray:
@@ -86,7 +86,7 @@ def tilts(up: FloatArray, desired: FloatArray) -> FloatArray:
     return elementary.arccos(np.clip(fixed_order.dot(up, wanted), -1.0, 1.0))
 
 
-def is_down(body: Posture, desired: Posture, standing_height: float) -> BoolArray:
+def is_down(body: PostureSeries, desired: PostureSeries, standing_height: float) -> BoolArray:
     """Where (r,) a body is down, as a body on its own ground; it has fallen if that lasts.
 
     It is down where its centre of mass is below half of what it should be, or its base's upward
@@ -106,7 +106,7 @@ def fall_row(down: BoolArray, ticks: FloatArray, rate_hz: float) -> int | None:
     `ticks` (r,) are the rows' numbers at a rate of `rate_hz`; a tick that is left out, as between
     two episodes, is a break.
     """
-    follows = np.zeros(len(down), dtype=np.bool_)  # the row before was down, too
+    follows = np.zeros(len(down), dtype=np.bool_)  # whether the row before was down
     follows[1:] = down[1:] & down[:-1] & (np.diff(ticks) == 1)
     starts = np.flatnonzero(down & ~follows)
     ends = np.flatnonzero(down & ~np.append(follows[1:], False))
@@ -137,7 +137,7 @@ class FallWatch:
         reader = self._reader
         wanted = np.full_like(position, np.nan) if desired is None else desired
         height, up = reader.read(np.stack((position, wanted)))
-        body, reference = Posture(height[:1], up[:1]), Posture(height[1:], up[1:])
+        body, reference = PostureSeries(height[:1], up[:1]), PostureSeries(height[1:], up[1:])
         down = bool(is_down(body, reference, reader.standing_height)[0])
         self.ticks_down = self.ticks_down + 1 if down else 0
         return self.ticks_down >= self._least

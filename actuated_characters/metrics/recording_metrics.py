@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
-from actuated_characters.metrics.error_measures import AT_LIMIT, distances
+from actuated_characters.metrics.error_measures import (
+    AT_LIMIT,
+    centre_path,
+    distances,
+    follows_state,
+)
 from actuated_characters.metrics.falls import reader_for
 from actuated_characters.metrics.run_metrics import Measurement, Series, Tick
 from msgs_config.arrays import BoolArray, FloatArray
@@ -37,8 +42,18 @@ class ContactSeries:
 
 
 def tracking_errors(recording: Recording) -> FloatArray:
-    """Distance (t + 1, b) of each vector from its reference, rad or m; NaN without a reference."""
-    return distances(recording.layout, recording.position, recording.reference_position)
+    """Distance (t + 1, b) of each vector from its reference, rad or m.
+
+    NaN without a reference, or where the reference is made of the state: see `follows_state`.
+    """
+    layout, position = recording.layout, recording.position
+    errors = distances(layout, position, recording.reference_position)
+    begins = np.zeros(len(position), dtype=np.bool_)
+    begins[recording.episode_rows] = True
+    moved = distances(layout, np.vstack((position[:1], position[:-1])), position)
+    before = np.zeros(errors.shape[1], dtype=np.bool_)
+    errors[follows_state(errors, moved, before, begins)] = np.nan
+    return errors
 
 
 def saturated_shares(shares: FloatArray) -> FloatArray:
@@ -98,6 +113,27 @@ def gravities(recording: Recording) -> FloatArray:
     for row in begins:
         found[row:] = float(recording.parameters_at(row).get("gravity", np.nan))
     return found
+
+
+def plan_errors(recording: Recording) -> dict[float, FloatArray]:
+    """Distance of the centre of mass from where a planner's plans had predicted it.
+
+    By the time ahead in s: errors in m of all plans, most of which others replaced before.
+    """
+    rate = int(recording.parameters["rate"])
+    ends = np.append(recording.episode_rows[1:], len(recording.times))
+    ahead, rows, predicted = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], [np.zeros((0, 3))]
+    for plan in recording.plans:
+        first = int(np.searchsorted(recording.stamps_ns, plan.stamp_ns))
+        ticks = np.round(plan.times * rate).astype(np.intp)
+        within = first + ticks < ends[np.searchsorted(ends, first, side="right")]
+        ahead.append(ticks[within])
+        rows.append(first + ticks[within])
+        predicted.append(plan.centres[within])
+    path = centre_path(recording.character, recording.position[np.concatenate(rows)])
+    errors = np.linalg.norm(np.concatenate(predicted) - path, axis=1)
+    at = np.concatenate(ahead)
+    return {ticks / rate: errors[at == ticks] for ticks in np.unique(at).tolist()}
 
 
 def measure_recording(recording: Recording) -> tuple[dict[str, object], Series]:

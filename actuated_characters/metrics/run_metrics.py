@@ -1,7 +1,6 @@
 """The figures of a run, measured tick by tick."""
 
-import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -16,7 +15,8 @@ from actuated_characters.metrics.error_measures import (
     vector_kinds,
 )
 from actuated_characters.metrics.falls import PostureReader, fall_row, is_down, tilts
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from actuated_characters.metrics.state_hash import StateHash
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
@@ -56,49 +56,6 @@ class Tick:
     state: StampedState
     following: StampedState
     reference: StampedReference | None
-
-
-class StateHash:
-    """A hash over every tick's state, its doubles bit for bit.
-
-    A copy goes on from the same states. A pickled one begins again with the hash so far: what
-    SHA-256 remembers cannot be sent to another process.
-    """
-
-    def __init__(self, before: str = "") -> None:
-        """Begin; `before` is the hash of states that are known by nothing else."""
-        self._hash = hashlib.sha256(before.encode())
-
-    def __reduce__(self) -> tuple[type["StateHash"], tuple[str]]:
-        return StateHash, (self.hexdigest(),)
-
-    def copy(self) -> "StateHash":
-        """Another one, of the same states so far."""
-        other = StateHash()
-        other._hash = self._hash.copy()
-        return other
-
-    def add(self, state: StampedState) -> None:
-        """Add a state: stamp, position and velocity."""
-        self._hash.update(state.stamp_ns.to_bytes(8, "little", signed=True))
-        self._hash.update(state.position.tobytes())
-        self._hash.update(state.velocity.tobytes())
-
-    def hexdigest(self) -> str:
-        """The hash of all states so far, hexadecimal."""
-        return self._hash.hexdigest()
-
-
-def hash_of_states(
-    stamps_ns: IntArray, position: Iterable[FloatArray], velocity: Iterable[FloatArray]
-) -> str:
-    """The hash over states in rows, as many as there are velocities."""
-    states = StateHash()
-    for stamp_ns, position_now, velocity_now in zip(
-        stamps_ns.tolist(), position, velocity, strict=False
-    ):
-        states.add(StampedState(stamp_ns, position_now, velocity_now, None))
-    return states.hexdigest()
 
 
 class Measurement:

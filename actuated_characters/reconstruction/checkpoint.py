@@ -13,7 +13,7 @@ from controller_node.references.offsets import Offsets
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.whole_files import write_whole
 
-_MALFORMED = (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError)
+_ERRORS_OF_MALFORMED = (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError)
 
 
 def checkpoint_path(output: Path) -> Path:
@@ -63,7 +63,7 @@ def read_checkpoint(path: Path, key: Mapping[str, Any]) -> Progress:
         )
     except OSError as error:
         raise RecordingError(f"cannot resume from {path}: {error.strerror or error}") from error
-    except _MALFORMED as error:
+    except _ERRORS_OF_MALFORMED as error:
         raise RecordingError(f"{path}: not a checkpoint that can be resumed") from error
 
 

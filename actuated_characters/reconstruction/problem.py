@@ -10,7 +10,7 @@ from controller_node.planner.settings import PREDICTIVE, RECORDED
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
-from sim_node.world_parameters import STEADY_CONTACTS
+from sim_node.physics.settings import STEADY_CONTACTS
 
 _PLANNING = {
     "planner": PREDICTIVE,
@@ -29,7 +29,7 @@ class Problem:
     duration: float  # s
     simulator: Mapping[str, object] = field(default_factory=dict)
     controller: Mapping[str, object] = field(default_factory=dict)
-    pushes: tuple[str, ...] = ()  # LINK:FX,FY,FZ@S, which come in the search, too
+    pushes: tuple[str, ...] = ()  # each as LINK:FX,FY,FZ@S; they come in the search, too
 
     def __post_init__(self) -> None:
         """Have the world of planned runs in the file as well, for whatever plays it."""
@@ -45,7 +45,8 @@ class Problem:
         Raises:
             ActuatedCharactersError: a name or value is wrong.
         """
-        gives_way = {"plan.gives_way": bool(self.pushes)}  # else the clip's own place is wanted
+        # Unpushed, the clip stays in its own place.
+        gives_way = {"plan.gives_way": bool(self.pushes)}
         planning = {**_PLANNING, **gives_way, **self.controller, "plan.workers": 1}
         return self._plan(self.clip, planning)
 

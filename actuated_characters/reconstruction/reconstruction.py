@@ -21,7 +21,6 @@ from controller_node.references.files.reconstructed import PLAN, RECONSTRUCTION
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.clips.reading import clip_path
 from msgs_config.errors import RunError
-from msgs_config.shared_parameters import COMMAND_DELAY
 from msgs_config.whole_files import write_whole
 
 
@@ -64,7 +63,7 @@ def reconstruct(
         ActuatedCharactersError: a name or value is wrong.
     """
     checkpoint, plan = checkpoint_path(job.output), job.problem.plan()
-    window = max(round(job.settings.window * plan.simulator.integer("rate")), 1)
+    window = max(round(job.settings.window * plan.simulation.rate_hz), 1)
     windows = -(-plan.ticks // window)
     progress = read_checkpoint(checkpoint, job.key) if job.resume else Progress([])
 
@@ -83,7 +82,7 @@ def reconstruct(
         raise RunError(
             f"{job.settings.tries} failures without getting any further, at last at window "
             f"{stuck_at + 1} of {windows}; {job.output} has the best attempt, "
-            f"{best.tick / plan.simulator.integer('rate'):.2f} s long; --resume tries again"
+            f"{best.tick / plan.simulation.rate_hz:.2f} s long; --resume tries again"
         )
     metrics = verified(job.problem, job.output, best)
     _write(job, plan, best, metrics)
@@ -93,8 +92,8 @@ def reconstruct(
 
 def _write(job: Job, plan: RunPlan, best: Node, metrics: ReconstructionMetrics | None) -> None:
     """Write the file: the clip, the plan that keeps it, and what they are of."""
-    problem, rate = job.problem, plan.simulator.integer("rate")
-    delay = plan.simulator.integer(COMMAND_DELAY.name)
+    problem, rate = job.problem, plan.simulation.rate_hz
+    delay = plan.simulation.command_delay_ticks
     made, last = [part for node in best.path for part in node.plans], best.tick + delay
     following = [*(tick for tick, _ in made[1:]), last]
     parts = tuple(

@@ -18,11 +18,11 @@ from actuated_characters.reconstruction.tree import Node
 from actuated_characters.reconstruction.world import Branch, Grown
 from msgs_config.errors import ConfigurationError, SimulationError
 
-_RECENT = 4  # windows whose costs count beside what is ahead
-_FURTHEST_BACK = 16  # windows that a search goes back at the most
-_PLACES = _FURTHEST_BACK + 1  # windows of which places are kept
-_MOST_WORLDS, _MOST_FAILURES = 2**10, 2**10  # bounds by which each world has seeds of its own
-_LARGEST_SEED = 2**32
+_WINDOWS_IN_COST = 4  # windows whose costs count beside what is ahead
+_MAX_WINDOWS_BACK = 16  # windows that a search goes back at the most
+_WINDOWS_KEPT = _MAX_WINDOWS_BACK + 1  # windows of which places are kept
+_MAX_WORLDS, _MAX_FAILURES = 2**10, 2**10  # bounds by which each world has seeds of its own
+_MAX_SEED = 2**32
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class SearchSettings:
     def check(self) -> None:
         """Raise ConfigurationError where a number cannot be used."""
         for name, value, least, most in (
-            ("worlds", self.worlds, 1, _MOST_WORLDS),
+            ("worlds", self.worlds, 1, _MAX_WORLDS),
             ("kept", self.survivors, 1, self.worlds),
             ("window", self.window, 0.01, 10.0),
-            ("seed", self.seed, 0, _LARGEST_SEED),
+            ("seed", self.seed, 0, _MAX_SEED),
         ):
             if not least <= value <= most:
                 raise ConfigurationError(f"--{name} is {value:g}; it must be {least:g} to {most:g}")
@@ -104,13 +104,13 @@ def search(
                 progress.stuck = 0
             if progress.window >= furthest:
                 progress.best = nodes[0]
-            for node in [node for level in progress.levels[:-_PLACES] for node in level]:
+            for node in [node for level in progress.levels[:-_WINDOWS_KEPT] for node in level]:
                 node.place = None
         else:
             failed = progress.window
             progress.failures += 1
             progress.stuck += 1
-            del progress.levels[max(failed - min(2**progress.stuck, _FURTHEST_BACK), 0) :]
+            del progress.levels[max(failed - min(2**progress.stuck, _MAX_WINDOWS_BACK), 0) :]
             if progress.stuck >= settings.tries:
                 progress.stuck = 0  # a resumed search tries again
                 report(progress)
@@ -159,12 +159,12 @@ def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:
 
 
 def _value(node: Node) -> float:
-    recent = [each.cost for each in node.path[-_RECENT:]]
+    recent = [each.cost for each in node.path[-_WINDOWS_IN_COST:]]
     return float(np.mean(recent)) + node.ahead
 
 
 def _seed(settings: SearchSettings, progress: Progress, world: int) -> int:
-    return (settings.seed * _MOST_FAILURES + progress.failures) * _MOST_WORLDS + world
+    return (settings.seed * _MAX_FAILURES + progress.failures) * _MAX_WORLDS + world
 
 
 def _node(parent: Node | None, seed: int, grown: Grown) -> Node:

@@ -18,7 +18,7 @@ class Node:
     end: FloatArray  # (2 n,) position and velocity
     cost: float  # mean cost of the states of its window
     ahead: float  # cost of going on as planned
-    place: Place | None = None  # from where other worlds can go on, as long as that is kept
+    place: Place | None = None  # other worlds can go on from it as long as it is kept
 
     @property
     def path(self) -> "list[Node]":

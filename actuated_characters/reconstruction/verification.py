@@ -38,7 +38,7 @@ def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
         SimulationError: the states are not those of the search, to the bit.
     """
     plan, motion = problem.plan_of(file), problem.plan().reference
-    clock = TickClock(plan.simulator.integer("rate"))
+    clock = TickClock(plan.simulation.rate_hz)
     ends = {node.tick: node for node in best.path}
     known = configuration.parse(configuration.describe(plan.character, plan.simulator))
     terrain = make_simulation_settings(plan.simulator).world.terrain

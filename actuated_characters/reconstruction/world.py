@@ -102,7 +102,7 @@ class TrialWorld:
         for tick in range(first, last):
             effort, _ = self._controller.compute_effort(simulated.state, self._episode_ns)
             made = self._planner.plan
-            if made is not None and made is not before:
+            if made is not None and made is not before:  # a plan in force stays one object
                 plans.append((made.tick, made.offsets.during(made.tick, self._period)))
                 before = made
             try:

@@ -5,15 +5,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Parameter, Values
 
 KEY = "forked_from"
-"""In `summary.json`, and in the custom data of the bag's metadata, where the value is JSON."""
-
-FORKED_FROM = Parameter(
-    KEY, "", "what the run was forked from: JSON, for the bag's metadata and summary.json"
-)
-"""A parameter of the recorder."""
+"""A parameter of the recorder; a key in `summary.json`, and in the custom data of the bag's
+metadata, where the value is JSON."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +42,12 @@ def read_forked_from(text: object) -> ForkedFrom | None:
         return None
 
 
-def given_origin(values: Values) -> dict[str, ForkedFrom]:
-    """The origin in the recorder's parameter, by its key; empty if none is given.
+def given_origin(text: str) -> dict[str, ForkedFrom]:
+    """The origin in a text of the recorder's parameter, by its key; empty if none is given.
 
     Raises:
         ConfigurationError: the text is not one that `to_json` writes.
     """
-    text = values.text(KEY)
     origin = read_forked_from(text)
     if text and origin is None:
         raise ConfigurationError(

@@ -4,14 +4,13 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from actuated_characters.recorder.parameters import PARAMETERS
+from actuated_characters.recorder.parameters import RecorderSettings
 from actuated_characters.recorder.recorder import Recorder
 from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topics import RecordedTopic, wanted_topics
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, ComposableNode, Turns
 from msgs_config.bus.in_process import InProcessNode
 from msgs_config.bus.node import Executor, StopFlag
-from msgs_config.parameters import resolve
 
 _FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the process
 
@@ -26,11 +25,11 @@ class InProcessRecorder(ComposableNode):
             ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
         """
         super().__init__(node)
-        values = resolve(PARAMETERS, node.given_parameters())
+        settings = RecorderSettings.given(node.given_parameters())
         self._progress = progress
-        self._progress_period = values.number("progress_period") or float("inf")  # 0: never
-        self._recorded = wanted_topics(node, values)
-        self._recorder = Recorder(node, values)
+        self._progress_period = settings.progress_period or float("inf")  # 0: never
+        self._recorded = wanted_topics(node, settings)
+        self._recorder = Recorder(node, settings)
         self._heard_ns = 0
         try:
             for recorded in self._recorded:

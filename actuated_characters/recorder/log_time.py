@@ -10,7 +10,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 _STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes before CDR's first field, and a sequence's first element
-_STAMPED = {"builtin_interfaces/msg/Time", "std_msgs/msg/Header"}
+_STAMP_TYPES = {"builtin_interfaces/msg/Time", "std_msgs/msg/Header"}
 _SETTLED_NS = 100_000_000  # ns in which all messages of one moment come, also on a busy machine
 _MOST_PENDING = 1000  # messages before the first state; few topics have any then
 
@@ -27,7 +27,7 @@ class SimulatedLogTime:
         self._first_ns: int | None = None
         self._last_ns = 0  # stamp of the newest state
         self._pending: list[Heard] = []
-        self._places: dict[str, int | None] = {}  # where messages have their stamp, by topic
+        self._places: dict[str, int | None] = {}  # the offset of the stamp by topic
         self._unsettled: list[Heard] = []
 
     def settle(self, batch: list[Heard], begun_ns: int | None) -> list[Heard]:
@@ -101,8 +101,8 @@ class SimulatedLogTime:
 def _stamp_place(type_name: str) -> int | None:
     """Where a serialised message has its stamp: its own, or that of the first of its elements."""
     first = first_field(type_name)
-    if first in _STAMPED:
+    if first in _STAMP_TYPES:
         return _STAMP_AT
-    if first.endswith("[]") and first_field(first.removesuffix("[]")) in _STAMPED:
+    if first.endswith("[]") and first_field(first.removesuffix("[]")) in _STAMP_TYPES:
         return _FIRST_STAMP_AT
     return None

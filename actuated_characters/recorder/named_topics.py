@@ -26,7 +26,7 @@ class NamedTopics:
         self.missing = {name for name in resolved if name not in known}
         """Names of which no publisher was seen so far."""
 
-    def look(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
+    def find_published(self) -> Iterator[tuple[RecordedTopic, QoSProfile]]:
         """Yield topics that have a publisher now, each once, with the QoS of the first publisher.
 
         A type that is not installed is logged, and the topic not looked for any more.

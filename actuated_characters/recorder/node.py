@@ -7,17 +7,17 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from actuated_characters.recorder.named_topics import NamedTopics
-from actuated_characters.recorder.parameters import PARAMETERS
+from actuated_characters.recorder.parameters import RecorderSettings
 from actuated_characters.recorder.recorder import Recorder
 from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import RecordedTopic, wanted_topics
 from msgs_config.bus.dds import DdsNode
+from msgs_config.bus.node import declared_settings
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.topic import LISTENING_DEPTH, Quality
-from msgs_config.parameters import resolve
 from msgs_config.runtime.process import StopSignal
 
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
@@ -38,13 +38,12 @@ class RecorderNode(DdsNode):
             ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
         """
         super().__init__(topics.RECORDER_NODE, **options)
-        values = resolve(PARAMETERS, self.given_parameters())
-        self.declare(PARAMETERS, values)
-        self._progress_period = values.number("progress_period")
+        settings = declared_settings(self, RecorderSettings)
+        self._progress_period = settings.progress_period
         self._readers: list[TopicReader] = []
-        wanted = wanted_topics(self, values)
-        self._named = NamedTopics(self, values.texts("topics"), {each.name for each in wanted})
-        self._recorder = Recorder(self, values)
+        wanted = wanted_topics(self, settings)
+        self._named = NamedTopics(self, settings.topics, {each.name for each in wanted})
+        self._recorder = Recorder(self, settings)
         for recorded in wanted:
             self._add(recorded, recorded.topic.quality)
 
@@ -90,7 +89,7 @@ class RecorderNode(DdsNode):
 
     def _search(self) -> float:
         """Record topics whose first publisher has come; returns when to look again, s."""
-        for recorded, offered in self._named.look():
+        for recorded, offered in self._named.find_published():
             try:
                 self._add(recorded, offered)
             except RecordingError as error:

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuated_characters.bags.format.metadata import BAG
-from actuated_characters.bags.format.storage import LOG_TIME, SIMULATED
+from actuated_characters.bags.format.storage import SIMULATED
 from actuated_characters.bags.last_parts import LastPartsWriter
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
 from actuated_characters.recorder.forked_from import given_origin
 from actuated_characters.recorder.log_time import SimulatedLogTime
+from actuated_characters.recorder.parameters import RecorderSettings
 from actuated_characters.recorder.run_directory import metrics_directory, write_metrics
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topics import RecordedTopic, simulator_name
@@ -20,9 +21,8 @@ from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
-from msgs_config.messages.session import REMEDY, SESSION, given_session, named
+from msgs_config.messages.session import REMEDY, SESSION, named
 from msgs_config.messages.topic import Quality
-from msgs_config.parameters import Values
 
 if TYPE_CHECKING:
     from rclpy.qos import QoSProfile
@@ -33,35 +33,34 @@ _BYTES_PER_MB = 10**6
 class Recorder:
     """The bag, the figures, and the session that both are of."""
 
-    def __init__(self, node: BusNode, values: Values) -> None:
+    def __init__(self, node: BusNode, settings: RecorderSettings) -> None:
         """Open the bag, in a directory below which the figures go as well.
 
-        `node` names the topics, and has the log; `values` are those of `recorder`'s parameters.
+        `node` names the topics, and has the log.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
         """
         self._node, self._log = node, node.get_logger()
-        self._directory = Path(values.text("directory"))
+        self._directory = Path(settings.directory)
         self._once_logger = OnceLogger(self._log)
         self._failure: str | None = None
-        self._filter = SessionFilter(given_session(values), self._once_logger.log_once)
+        self._filter = SessionFilter(settings.session.id, self._once_logger.log_once)
         self._collectors = {
-            name: MetricsCollector(simulator_name(node, name))
-            for name in values.texts("characters") or ("",)
+            name: MetricsCollector(simulator_name(node, name)) for name in settings.names
         }
-        self._origin = given_origin(values)
-        self._bag = self._open_bag(values)
-        is_simulated = values.text(LOG_TIME) == SIMULATED
+        self._origin = given_origin(settings.forked_from)
+        self._bag = self._open_bag(settings)
+        is_simulated = settings.log_time == SIMULATED
         self.log_time = SimulatedLogTime() if is_simulated else None
         self._log.info(f"recording to {self._directory}")
 
-    def _open_bag(self, values: Values) -> BagWriter | LastPartsWriter | None:
-        if not values.flag("write_bag"):
+    def _open_bag(self, settings: RecorderSettings) -> BagWriter | LastPartsWriter | None:
+        if not settings.write_bag:
             return None
         path = self._directory / BAG
-        options = {"compression": values.text("compression"), "log_time": values.text(LOG_TIME)}
-        least = round(values.number("last_megabytes") * _BYTES_PER_MB)
+        options = {"compression": settings.compression, "log_time": settings.log_time}
+        least = round(settings.last_megabytes * _BYTES_PER_MB)
         bag = LastPartsWriter(path, least, **options) if least else BagWriter(path, **options)
         for name, origin in self._origin.items():
             bag.set_custom_data(name, origin.to_json())

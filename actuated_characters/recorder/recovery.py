@@ -16,7 +16,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.configuration import parse_world
 
-_DAMAGED, _SCRATCH = ".damaged", ".recovering"
+_DAMAGED_SUFFIX, _SCRATCH_SUFFIX = ".damaged", ".recovering"
 _REPORT_PERIOD = 1000  # messages between two reports
 
 
@@ -48,7 +48,7 @@ def recover(path: Path, progress: Progress = lambda stage, fraction: None) -> Re
             full, or the original of an earlier recovery is in the way.
     """
     try:
-        is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED))
+        is_run = any((path / f"{BAG}{end}").is_dir() for end in ("", _DAMAGED_SUFFIX))
         bag = path / BAG if is_run else path
         if bag.name in ("", ".."):
             bag = bag.resolve()
@@ -68,7 +68,7 @@ def _recover_bag(bag: Path, progress: Progress) -> Recovered:
     contents = _read_whole(bag, progress)
     if contents is not None:
         return Recovered(bag, contents, None)
-    damaged, scratch = bag.with_name(bag.name + _DAMAGED), _scratch(bag)
+    damaged, scratch = bag.with_name(bag.name + _DAMAGED_SUFFIX), _scratch(bag)
     if damaged.exists():
         raise RecordingError(f"{damaged} is in the way: what an earlier recovery kept; move it")
     try:
@@ -91,7 +91,7 @@ def _recover_bag(bag: Path, progress: Progress) -> Recovered:
 
 
 def _scratch(bag: Path) -> Path:
-    return bag.with_name(bag.name + _SCRATCH)
+    return bag.with_name(bag.name + _SCRATCH_SUFFIX)
 
 
 def _finish_swap(bag: Path) -> None:

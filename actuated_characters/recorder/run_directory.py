@@ -15,7 +15,7 @@ from msgs_config.errors import RecordingError, RunError
 from msgs_config.whole_files import part_of, write_whole, writing
 
 PARAMETERS, LOGS = "parameters", "logs"
-DAMAGED = BAG + ".damaged"  # what `recover` leaves beside the bag that it makes
+DAMAGED = BAG + ".damaged"  # what a recovery leaves beside the bag that it makes
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
 REPORT = "report"  # what `report` makes of the bag

@@ -4,21 +4,21 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from actuated_characters.recorder.parameters import RecorderSettings
 from msgs_config.bus.node import BusNode
 from msgs_config.character.sensors import SensorType
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.topic import Kept, Topic
-from msgs_config.parameters import Values
 
 # The streams come last: when a publisher of theirs sees its subscriber, all others are there too.
-_RECORDED = [
+_RECORDED_TOPICS = [
     topic
     for each in reversed(topics.TABLE)
     if each.kept in (Kept.UNLESS_EXCLUDED, Kept.ALWAYS) and each.is_installed
     for topic in each.as_others_name_it
 ]
-EXCLUDABLE = sorted(topic.name for topic in _RECORDED if topic.kept is not Kept.ALWAYS)
+EXCLUDABLE = sorted(topic.name for topic in _RECORDED_TOPICS if topic.kept is not Kept.ALWAYS)
 """Topics that a recording may do without."""
 
 
@@ -32,17 +32,16 @@ class RecordedTopic:
     character: str | None  # None if the topic is of all characters, or of none
 
 
-def wanted_topics(node: BusNode, values: Values) -> list[RecordedTopic]:
-    """The topics that the values of `recorder`'s parameters say, in the order to subscribe.
+def wanted_topics(node: BusNode, settings: RecorderSettings) -> list[RecordedTopic]:
+    """The topics that the recorder's settings say, in the order to subscribe.
 
     Raises:
         ConfigurationError: a name is wrong.
     """
-    has_bag = values.flag("write_bag")
-    characters = values.texts("characters") or ("",)
-    found = contract_topics(node, characters, values.texts("exclude"), measured_only=not has_bag)
+    has_bag, names = settings.write_bag, settings.names
+    found = contract_topics(node, names, settings.exclude, measured_only=not has_bag)
     # The sensors come first: the simulator begins when its states have all their subscribers.
-    return (sensor_topics(node, values.texts("sensors")) if has_bag else []) + found
+    return (sensor_topics(node, settings.sensors) if has_bag else []) + found
 
 
 def contract_topics(
@@ -63,8 +62,8 @@ def contract_topics(
     if twice:
         raise ConfigurationError(f"parameter 'characters' has '{twice[0]}' twice")
     check_names(node, "characters", characters)
-    found = [_recorded(node, topic, None) for topic in _RECORDED if topic.of_world]
-    of_each = [topic for topic in _RECORDED if not topic.of_world]
+    found = [_recorded(node, topic, None) for topic in _RECORDED_TOPICS if topic.of_world]
+    of_each = [topic for topic in _RECORDED_TOPICS if not topic.of_world]
     found += [_recorded(node, topic, name) for topic in of_each for name in characters]
     left_out: list[RecordedTopic] = []
     for name in exclude:

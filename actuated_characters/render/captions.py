@@ -10,7 +10,7 @@ from actuated_characters.render.engine.renderer import Picture
 
 _SHARE = 15  # a picture is so many times as high as its caption ...
 _MIN_PIXELS = 16  # ... but a caption has at least so many pixels
-_DPI = 72  # so that a point is a pixel
+_DPI = 72  # a point is a pixel then
 _WHITE = 255.0
 
 

@@ -1,20 +1,16 @@
 """Draws the pictures of a movie, in several processes: the same ones however many there are."""
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import RunError
+from msgs_config.runtime.worker_processes import WorkerProcesses
 
 _FRAMES_AHEAD = 2  # frames that wait for each process, so that it never waits for the next one
 
@@ -55,12 +51,13 @@ def draw(
             for frame in frames:
                 yield _picture(settings, renderer, frame)
         return
-    with _processes(settings, min(workers, len(frames))) as pool:
+    # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
+    sent = replace(settings, characters=tuple(replace(each) for each in settings.characters))
+    with WorkerProcesses(min(workers, len(frames)), _begin, sent) as pool:
         drawn: deque[Future[Picture]] = deque()
         try:
             for frame in frames:
-                with _interrupts_blocked():  # a process that is started here inherits the block
-                    drawn.append(pool.submit(_draw_in_process, frame))
+                drawn.append(pool.submit(_draw_in_process, frame))
                 if len(drawn) >= _FRAMES_AHEAD * workers:
                     yield drawn.popleft().result()
             while drawn:
@@ -74,28 +71,6 @@ def _picture(settings: SceneSettings, renderer: Renderer, frame: FrameSpec) -> P
     return settings.write(picture, frame.caption) if frame.caption else picture
 
 
-@contextmanager
-def _processes(settings: SceneSettings, workers: int) -> Generator[ProcessPoolExecutor, None, None]:
-    """Processes that draw; they end with the context, or with this process."""
-    # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
-    sent = replace(settings, characters=tuple(replace(each) for each in settings.characters))
-    context = multiprocessing.get_context("spawn")  # an engine does not survive a fork
-    pool = ProcessPoolExecutor(workers, context, initializer=_begin, initargs=(sent,))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def _interrupts_blocked() -> Generator[None, None, None]:
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 # In a process that draws
 
 _settings: SceneSettings
@@ -105,15 +80,6 @@ _renderer: Renderer | None = None
 def _begin(settings: SceneSettings) -> None:
     global _settings
     _settings = settings
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End when the parent is killed, which ends nothing by itself."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _draw_in_process(frame: FrameSpec) -> Picture:

@@ -24,7 +24,7 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters, root_path
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
-from actuated_characters.render.scene import Scene, make_scene, part_of
+from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from actuated_characters.render.stills import LONGEST_ARROW, Progress, check_size
 from actuated_characters.render.video import check_video, write_video
 from msgs_config.arrays import FloatArray, IntArray
@@ -38,8 +38,9 @@ _YAW, _PITCH = 0.75, 0.22  # rad: from the right side and in front, so that besi
 _FOLLOWED_S = 0.6  # s of the root's path before and after that count for the camera's
 _LEAST_BESIDE = 0.5  # share of its height: the ghost of a narrower character is so far beside it
 _MOST_FRAMED = 150  # pictures that decide on the scale
-_ASTRAY = 1.5  # in heights of the character: a ghost that is farther away may leave the picture
-_BETWEEN = "   "  # what separates the parts of a caption
+# A ghost that is farther away, in heights of the character, may leave the picture.
+_GHOST_RANGE = 1.5
+_CAPTION_SEPARATOR = "   "  # what separates the parts of a caption
 _MOST_PICTURES = 100_000
 _PICTURES_A_WORKER = 15  # fewer are drawn sooner than another process has started
 
@@ -48,7 +49,7 @@ class GhostPlace(Enum):
     """Where a movie has the reference."""
 
     BESIDE = "beside"  # beside the character, so that both are seen whole
-    OVER = "over"  # in the place where the reference really is
+    OVER = "over"  # where the reference really is, over the character
     NONE = "none"
 
 
@@ -141,10 +142,10 @@ class Movie:
         like, offset = CameraPose(yaw=heading + _YAW, pitch=_PITCH), (0.0, 0.0, 0.0)
         bodies = posed.outline(scene.position[self._rows[some]], ways[some])
         width, height, _ = extents(bodies, like).tolist()
-        if self._ghost is GhostPlace.BESIDE:  # to the left, which is away from the camera
+        if self._ghost is GhostPlace.BESIDE:  # the left side is away from the camera
             distance = max(width, _LEAST_BESIDE * height) / sin(_YAW)
             offset = (-distance * sin(heading), distance * cos(heading), 0.0)
-        ghosts = self._near_references(self._rows[some], _ASTRAY * height)
+        ghosts = self._near_references(self._rows[some], _GHOST_RANGE * height)
         longest = LONGEST_ARROW * max(width, height)
         seen = [
             bodies,
@@ -192,7 +193,7 @@ def picture_rows(times: FloatArray, settings: MovieSettings) -> IntArray:
     return nearest_rows(times, start + step * np.arange(floor(count) + 1.0))
 
 
-def camera_path(scene: Scene) -> FloatArray:
+def camera_path(scene: RecordedScene) -> FloatArray:
     """Where (t + 1, 2) the camera is with the characters, m along the ground; it cuts at resets.
 
     It follows the middle of their roots; where one has a fixed base it rests.
@@ -203,7 +204,7 @@ def camera_path(scene: Scene) -> FloatArray:
     return np.concatenate([smoothed(path[a:b], reach) for a, b in pairwise(ends)])
 
 
-def caption(scene: Scene, row: int, speed: float = 1.0) -> str:
+def caption(scene: RecordedScene, row: int, speed: float = 1.0) -> str:
     """What is written on the picture of a state: when it is, and how it came about."""
     parts = [f"{scene.times[row]:.2f} s"]
     if speed != 1.0:
@@ -215,7 +216,7 @@ def caption(scene: Scene, row: int, speed: float = 1.0) -> str:
         parts.append("real time")
     if len(scene.episode_rows) > 1:
         parts.append(f"episode {np.searchsorted(scene.episode_rows, row, side='right')}")
-    return _BETWEEN.join(parts)
+    return _CAPTION_SEPARATOR.join(parts)
 
 
 def _law(recording: Recording, stamp_ns: int) -> str:
@@ -227,7 +228,7 @@ def _law(recording: Recording, stamp_ns: int) -> str:
     return law
 
 
-def _ghost_place(scene: Scene, wanted: GhostPlace | None) -> GhostPlace:
+def _ghost_place(scene: RecordedScene, wanted: GhostPlace | None) -> GhostPlace:
     if scene.has_reference:
         return wanted or GhostPlace.BESIDE
     if wanted in (GhostPlace.BESIDE, GhostPlace.OVER):
@@ -235,7 +236,7 @@ def _ghost_place(scene: Scene, wanted: GhostPlace | None) -> GhostPlace:
     return GhostPlace.NONE
 
 
-def _heading(scene: Scene) -> float:
+def _heading(scene: RecordedScene) -> float:
     """Where the first character faces at first: a turn about z from how its file has it, rad."""
     recording = scene.recordings[0]
     character = recording.character

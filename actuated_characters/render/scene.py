@@ -16,7 +16,7 @@ from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
 _RADIUS = 0.1  # m, of a ball whose radius was not recorded
-_SHORTEST = 0.25  # length of the shortest arrow, as a share of the longest one's
+_SHORTEST_ARROW = 0.25  # length of the shortest arrow, as a share of the longest one's
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
     *("reference_position", "reference_velocity", "balls", "commands"),
@@ -25,7 +25,7 @@ _OF_TICKS = ("effort", "contacts", "applied_wrench", "throws")
 
 
 @dataclass(frozen=True)
-class Scene:
+class RecordedScene:
     """The characters of one world over t ticks; n degrees of freedom in all.
 
     Arrays have those of one character after those of another, and so it is with the links (l).
@@ -123,7 +123,7 @@ class Scene:
                 link = links.get(acting.links[number])
                 if link is None or norm == 0.0 or norm <= strongest.get(link, (0.0,))[0]:
                     continue
-                share = _SHORTEST + (1.0 - _SHORTEST) * norm / self._strongest
+                share = _SHORTEST_ARROW + (1.0 - _SHORTEST_ARROW) * norm / self._strongest
                 has_points = len(acting.points) > 0
                 point = acting.points[number] if has_points else self._centres[link]
                 arrow = acting.wrenches[number, :3] * (share / norm)
@@ -155,7 +155,7 @@ class Scene:
         return np.array([link.inertial_pose.position for link in links])
 
 
-def make_scene(recordings: Sequence[Recording]) -> Scene:
+def make_scene(recordings: Sequence[Recording]) -> RecordedScene:
     """The scene of the characters of one world, over the ticks that there are of all of them.
 
     Raises:
@@ -172,7 +172,7 @@ def make_scene(recordings: Sequence[Recording]) -> Scene:
     last = min(int(recording.stamps_ns[-1]) for recording in recordings)
     if first > last:
         raise RecordingError("the recording has no tick that all its characters have")
-    return Scene(tuple(_cut(recording, first, last) for recording in recordings))
+    return RecordedScene(tuple(_cut(recording, first, last) for recording in recordings))
 
 
 def _cut(recording: Recording, first_ns: int, last_ns: int) -> Recording:

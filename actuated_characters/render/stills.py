@@ -21,21 +21,21 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
-from actuated_characters.render.scene import Scene, make_scene, part_of
+from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.nearest_rows import nearest_rows
 from msgs_config.whole_files import write_whole
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 
 LONGEST_ARROW = 0.4  # share of the extent of the characters
 
-_SMALLEST, _LARGEST = 16, 4096  # pixels along an edge of a picture
+_MIN_EDGE, _MAX_EDGE = 16, 4096  # pixels along an edge of a picture
 _MOST_PIXELS = 2**26  # pixels of a whole strip
 _TILE_HEIGHT = 400  # pixels, by default
-_NARROWEST, _WIDEST = 0.5, 1.6  # width over height, by default
-_COLUMNS = 8  # at the most, by default
+_MIN_ASPECT, _MAX_ASPECT = 0.5, 1.6  # width over height, by default
+_COLUMNS = 8  # most columns, by default
 _GAP = 3  # pixels between pictures
 _WHITE = 255
 
@@ -157,7 +157,7 @@ def _with_views(
     longest = LONGEST_ARROW * float(extents(outline, like)[:2].max())
     tails = posed.tails(positions, ways[: len(frames)], [f.forces for f in frames], longest)
     outline = Spheres.joined((outline, tails))
-    aspect = min(max(natural_aspect(outline, like), _NARROWEST), _WIDEST)
+    aspect = min(max(natural_aspect(outline, like), _MIN_ASPECT), _MAX_ASPECT)
     size = size or (round(aspect * _TILE_HEIGHT), _TILE_HEIGHT)
     check_size(size, len(frames))
     view = framing(outline, size[0] / size[1], like)
@@ -178,7 +178,9 @@ def save_png(picture: Picture, path: Path) -> None:
     write_whole(path, content.getvalue())
 
 
-def _rows(scene: Scene, times: Sequence[float] | int, start: float, end: float | None) -> IntArray:
+def _rows(
+    scene: RecordedScene, times: Sequence[float] | int, start: float, end: float | None
+) -> IntArray:
     """The states (p,) that are nearest to times in s, or evenly from a start to an end."""
     count = times if isinstance(times, int) else len(times)
     if count < 1:
@@ -195,10 +197,10 @@ def _rows(scene: Scene, times: Sequence[float] | int, start: float, end: float |
 def check_size(size: Size, count: int) -> None:
     """Check the size of so many pictures; raises ConfigurationError if it is not sensible."""
     width, height = size
-    if not all(_SMALLEST <= edge <= _LARGEST for edge in size):
+    if not all(_MIN_EDGE <= edge <= _MAX_EDGE for edge in size):
         raise ConfigurationError(
             f"size {width}x{height} is not sensible; "
-            f"it must be {_SMALLEST}x{_SMALLEST} to {_LARGEST}x{_LARGEST} pixels"
+            f"it must be {_MIN_EDGE}x{_MIN_EDGE} to {_MAX_EDGE}x{_MAX_EDGE} pixels"
         )
     if count * width * height > _MOST_PIXELS:
         raise ConfigurationError(

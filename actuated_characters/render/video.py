@@ -20,7 +20,7 @@ FASTEST = 240  # frames a second
 _ENCODER = "libx264"
 _QUALITY = {"crf": "20", "preset": "medium"}  # edges and tiles without visible blocks
 _KEY_FRAME_S = 1.0  # s between frames that a player can jump to
-_BT_709 = 1  # as H.264 numbers the colour space that players take for granted
+_BT_709 = 1  # H.264's number of the colour space that players take for granted
 _LIMITED_RANGE = 1
 
 

@@ -28,7 +28,7 @@ class CommandComparison:
     states: int  # states whose answers were compared
     first: Difference | None  # the first that is not the same to the last bit
     largest: Difference | None
-    joints: tuple[JointDifference, ...]  # of the joints that are commanded
+    joints: tuple[JointDifference, ...]  # one for each joint that is commanded
     lacking: tuple[str, ...]  # degrees of freedom that were commanded then, and are not now
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics import error_measures
 from actuated_characters.metrics.error_measures import different_bits
-from actuated_characters.metrics.run_metrics import hash_of_states
+from actuated_characters.metrics.state_hash import hash_of_states
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
@@ -68,7 +68,7 @@ class ReplayResult:
     difference: Difference | None  # the first one, None if all is identical or within tolerance
     states: int  # states of each character that were compared
     episodes: int
-    state_hashes: Mapping[str, str]  # of the replayed states, by `Recording.name`
+    state_hashes: Mapping[str, str]  # the replayed states' hashes by `Recording.name`
     largest: Mapping[str, float] = field(default_factory=dict)  # differences by unit
     remarks: Sequence[str] = ()  # what could not be compared, and why
 
@@ -81,6 +81,11 @@ class ReplayResult:
 def clock_of(recording: Recording) -> TickClock:
     """The clock of the recorded simulator."""
     return TickClock(int(recording.parameters[RATE.name]))
+
+
+def first_tick_of(recording: Recording) -> int:
+    """The tick of a recording's first state."""
+    return clock_of(recording).tick(int(recording.stamps_ns[0]))
 
 
 def same_bits(one: FloatArray, other: FloatArray) -> bool:
@@ -147,6 +152,8 @@ def first_difference(
     differences = []
     for quantity, values in found.items():
         recorded = _values(recording, quantity, slice(first_row, first_row + len(values)))
+        if quantity == EFFORT and not first_row and recording.keyframe is not None:
+            values = np.concatenate((recorded[:1], values[1:]))  # its first state's is not in it
         if tolerance is None and same_bits(recorded, values):
             continue
         apart = _apart(recording.layout, quantity, recorded, values)

@@ -20,7 +20,9 @@ from actuated_characters.replay.world import of_character, simulator_values
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.errors import LayoutError
 from msgs_config.parameters import Values
-from sim_node.node_settings import make_node_settings
+from sim_node.initial_state import CharacterSettings
+from sim_node.node_settings import NodeSettings
+from sim_node.physics.settings import SimulationSettings
 
 _ARRIVAL_TICKS = 2  # ticks by which the arrival of a command without a stamp is uncertain
 
@@ -86,7 +88,7 @@ def check_commands(recording: Recording) -> CommandCheck:
     check = _Check(recording, values)
     found = (
         check.check_realtime()
-        if make_node_settings(values).is_realtime
+        if NodeSettings.of(values).is_realtime
         else check.check_lockstep(values)
     )
     difference = next((each for each in found if each is not None), None)
@@ -100,21 +102,27 @@ class _Check:
         self._recording = recording
         self._layout = recording.layout
         self._limits = recording.character.effort_limits()
-        self._commanded: BoolArray = self._layout.mask(values.texts("commanded_joints"))
-        self._delay = values.integer("command_delay_ticks")
+        self._commanded: BoolArray = self._layout.mask(
+            CharacterSettings.of(values).commanded_joints
+        )
+        self._delay = SimulationSettings.of(values).command_delay_ticks
         self._zero = np.zeros(self._layout.size)
         self.silent_rows: list[int] = []
 
     def check_lockstep(self, values: Values) -> Iterator[Difference | None]:
         """Yield what is wrong with a tick; None where other commands explain it."""
-        self._on_timeout = values.text("on_timeout")
+        self._on_timeout = NodeSettings.of(values).on_timeout
         for first, end in self._episodes():
             previous = self._zero
-            for row in range(first, end):
+            for row in range(first + self._unknown_ticks(first), end):
                 tick = self._tick(row, first, previous)
                 if not same_bits(self._clip(tick.collected), self._recording.effort[row]):
                     yield self._settle(tick)
                 previous = tick.collected
+
+    def _unknown_ticks(self, first: int) -> int:
+        """The ticks from a row on in which commands act that are not in the recording."""
+        return self._delay if not first and self._recording.keyframe is not None else 0
 
     def _episodes(self) -> Iterator[tuple[int, int]]:
         """The first tick of each episode and the one after its last, which may be a reset."""
@@ -208,6 +216,9 @@ class _Check:
         for first, end in self._episodes():
             sent = deque(self._sent(first, end))
             known = [{0} for _ in range(self._layout.size)]  # bits that an entry can have; 0 is 0.0
+            if not first and self._recording.keyframe is not None:  # one may be held from before
+                held = self._recording.effort[: self._delay + 1].view(np.int64)
+                known = [{0, *bits} for bits in held.T.tolist()]
             for row in range(first, end):
                 answered = row - self._delay
                 while sent and first <= answered and sent[0][0] <= answered + later:

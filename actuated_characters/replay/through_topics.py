@@ -9,7 +9,11 @@ import numpy as np
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.replay.command_comparison import CommandComparison, compare_commands
 from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
-from actuated_characters.replay.players.character_files import write_character, write_urdf
+from actuated_characters.replay.players.character_files import (
+    write_character,
+    write_keyframe,
+    write_urdf,
+)
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT
@@ -27,9 +31,9 @@ from actuated_characters.runs.processes import Child, Children
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
-from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT
-from sim_node.parameters import CHARACTERS
-from sim_node.world_parameters import WORLD_PARAMETERS
+from msgs_config.shared_parameters import CHARACTER, COLLISION, KEYFRAME, PLACEMENT
+from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
+from sim_node.physics.settings import SimulationSettings
 
 _OF_A_CHARACTER = (
     COLLISION.name,
@@ -47,7 +51,7 @@ _NOT_TO_BE_SET = (
     "rate",
     "wait_for_subscribers",
 )
-_APPLIED = (
+_APPLIED_EFFORTS_REMARK = (
     "not every tick has its commands in the bag, so the efforts that were really applied were "
     "sent, to a simulator in lockstep without effort limits and without delay"
 )
@@ -88,7 +92,7 @@ def replay_commands(
         except RunError as error:
             failure = error  # matters only if nothing is found to differ
         found = _found_states(player, file, len(together))
-    remarks += [_APPLIED] if are_applied else []
+    remarks += [_APPLIED_EFFORTS_REMARK] if are_applied else []
     result = compare_world(together, found, tolerance, remarks) if found else None
     if result is None or (failure is not None and result.identical):
         raise failure or RunError("the player has received no states")
@@ -116,6 +120,7 @@ def _simulator_parameters(
         parameters |= {prefix + name: values[name] for name in _OF_A_CHARACTER}
     if are_applied:
         parameters["command_delay_ticks"] = 0
+    parameters[KEYFRAME.name] = write_keyframe(directory, topics.SIM_NODE, together[0].keyframe)
     return parameters | {
         "mode": "lockstep",
         "real_time_factor": 0.0,
@@ -124,7 +129,8 @@ def _simulator_parameters(
         "lockstep_timeout": 0.0,
         "on_timeout": "abort",
         "on_fault": "abort",
-        "wrench_duration": 1.0 / first.integer("rate"),  # each tick's pushes are sent for it alone
+        "wrench_duration": 1.0
+        / SimulationSettings.of(first).rate_hz,  # each tick's pushes are sent for it alone
     }
 
 
@@ -166,6 +172,11 @@ def replay_states(
     for name in _NOT_TO_BE_SET:
         if name in settings:
             raise ConfigurationError(f"parameter '{name}' is set by the recording")
+    if settings and recording.controller_keyframe is not None:
+        raise ConfigurationError(
+            "the recording begins with a keyframe, in which its controller has the parameters of "
+            "then; --set is for recordings that begin with their run"
+        )
     session = {SESSION.name: make_session(f"/{topics.SIM_NODE}")}
     with child_processes(own=start) as children:
         others = []
@@ -203,5 +214,10 @@ def _player_parameters(
 
 def _controller_parameters(directory: Path, recording: Recording) -> dict[str, object]:
     """The recorded controller's parameters, for one that waits for the player."""
-    own_file = {CHARACTER.name: str(write_character(directory, recording.character))}
-    return first_parameters(recording) | own_file | {"wait_for_subscribers": 1}
+    own_files = {
+        CHARACTER.name: str(write_character(directory, recording.character)),
+        KEYFRAME.name: write_keyframe(
+            directory, topics.CONTROLLER_NODE, recording.controller_keyframe
+        ),
+    }
+    return first_parameters(recording) | own_files | {"wait_for_subscribers": 1}

@@ -11,16 +11,18 @@ from actuated_characters.bags.recording import Recording, read_recordings
 from actuated_characters.replay.comparison import clock_of
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
 from msgs_config.messages.clock import TickClock
+from msgs_config.messages.keyframe import decode_keyframe
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Values
 from msgs_config.versions import describe_changes, installed_versions
 from sim_node.initial_state import changed_start
+from sim_node.interface.keyframes import read_memory
 from sim_node.parameters import resolve_alone
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup
-from sim_node.physics.simulation import Simulation, SimulationSettings
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.simulation import Simulation, Snapshot
 from sim_node.physics.wrenches import ExternalWrench
-from sim_node.simulation_factory import change_world, make_character_setup, make_simulation_settings
+from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 _GROUNDS = ("plane", "none")
 _MOST_BEHIND = 1  # states that a stopped recorder may have more of one character than of another
@@ -35,8 +37,8 @@ def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
     """
     if any(recording.begins_amid for recording in recordings):
         raise RecordingError(
-            "the recording begins in the middle of an episode, and no other begins in it: it can "
-            "be viewed, not repeated; `play --output DIR` keeps a scene from its start"
+            "the recording begins in the middle of an episode, and has neither another one nor a "
+            "keyframe: it can be viewed, not repeated"
         )
     found: dict[tuple[str, ...], list[Recording]] = {}
     for recording in recordings:
@@ -76,7 +78,7 @@ class ResetChanges:
     """What is different from an episode on."""
 
     world: WorldSettings
-    states: Mapping[str, StampedState]  # where characters begin, by their names in the world
+    states: Mapping[str, StampedState]  # first states by the characters' names in the world
 
 
 def changes_of_reset(
@@ -94,7 +96,7 @@ def changes_of_reset(
         before, after = (simulator_values(recording, each) for each in (row - 1, row))
         if (state := changed_start(before, after)) is not None:
             states[recording.world.name] = state
-    return ResetChanges(change_world(world, simulator_values(together[0], row)), states)
+    return ResetChanges(world.changed(simulator_values(together[0], row)), states)
 
 
 def of_character(recording: Recording) -> str:
@@ -131,7 +133,8 @@ def check_throws(recording: Recording) -> list[str]:
     Raises:
         RecordingError: there were balls, and it does not have how they were thrown.
     """
-    thrown = sum(map(len, recording.throws))
+    known = recording.balls[0] if recording.balls and recording.keyframe else None
+    thrown = sum(map(len, recording.throws)) + (0 if known is None else len(known.names))
     balls = max((len(each.names) for each in recording.balls if each is not None), default=0)
     if balls > thrown:
         raise RecordingError(
@@ -162,7 +165,17 @@ def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simul
     ]
     settings = _settings(together[0], values[0])
     first_tick = TickClock(settings.rate_hz).tick(first_stamp_ns)
-    return Simulation(setups, settings, first_tick)
+    simulation = Simulation(setups, settings, first_tick)
+    if together[0].keyframe is not None:
+        memory = decode_keyframe(together[0].keyframe).memory
+        simulation.load_snapshot(_of_applied(read_memory(memory, simulation)[0], settings))
+    return simulation
+
+
+def _of_applied(snapshot: Snapshot, settings: SimulationSettings) -> Snapshot:
+    """A state for efforts as really applied: none is on its way."""
+    characters = tuple(replace(each, delayed=()) for each in snapshot.characters)
+    return replace(snapshot, settings=settings, characters=characters)
 
 
 def _settings(recording: Recording, values: Values) -> SimulationSettings:
@@ -170,8 +183,8 @@ def _settings(recording: Recording, values: Values) -> SimulationSettings:
     terrain = recording.world.terrain
     if terrain is not None:
         values = Values(values | {"terrain": "none"})
-    elif values.text("terrain") not in _GROUNDS:
-        raise RecordingError(f"the recording lacks its terrain, {values.text('terrain')}")
+    elif (path := SimulationSettings.of(values).terrain) not in _GROUNDS:
+        raise RecordingError(f"the recording lacks its terrain, {path}")
     settings = make_simulation_settings(values)
     world = replace(settings.world, terrain=terrain)
     return replace(settings, world=world, command_delay_ticks=0)

@@ -1,209 +1,235 @@
-"""The contents of a bag, of this project or any other: files, topics, and when messages came."""
+"""The contents of a bag, of this project or any other, without reading its messages.
 
-import struct
-from array import array
-from collections.abc import Callable
+They come from the statistics of its files, its metadata, and a few messages of each character.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
-from actuated_characters.bags.format.metadata import METADATA, load_metadata, storage_of
+from actuated_characters.bags.format.metadata import storage_of
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
-from actuated_characters.bags.reader import RecordedMessage, read_messages
-from actuated_characters.bags.recording import find_bag
+from actuated_characters.bags.reader import OpenBag, open_bag
+from actuated_characters.bags.recording import describe_foreign, find_bag
+from actuated_characters.bags.robots.reading import is_own
 from actuated_characters.recorder.forked_from import KEY, ForkedFrom, read_forked_from
-from msgs_config.errors import MessageError, RecordingError
-from msgs_config.messages import topics
+from actuated_characters.report.verdict import describe_law
+from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.model import ROOT_TORQUE
+from msgs_config.errors import ConfigurationError, MessageError
+from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import decode_string
-from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
+from msgs_config.messages.configuration import RunConfiguration
 
 _STATES = topics.JOINT_STATES.name
-_CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE).name
-_STATE_TYPE, _TEXT_TYPE = "sensor_msgs/msg/JointState", "std_msgs/msg/String"
-_HEADER_BYTES = 12  # bytes of a message up to the end of its stamp
+_SIMULATOR = topics.CONFIGURATION.of(topics.SIM_NODE).name
+_CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 
 
-@dataclass
+@dataclass(frozen=True)
 class TopicContents:
     """The messages of one topic."""
 
     name: str
-    type_name: str
-    count: int = 0
-    first_ns: int = 0  # when it was published, by the wall clock
-    last_ns: int = 0
-    largest_gap_ns: int = 0  # between two messages that follow each other
-    has_wall_times: bool = True  # False: times are simulated log times
-
-    def add(self, message: RecordedMessage) -> None:
-        """Count a message, later than all before."""
-        sent_ns = message.sent_ns
-        if self.count:
-            self.largest_gap_ns = max(self.largest_gap_ns, sent_ns - self.last_ns)
-        else:
-            self.first_ns = sent_ns
-        self.last_ns = sent_ns
-        self.has_wall_times &= message.published_ns is not None
-        self.count += 1
-
-    @property
-    def rate_hz(self) -> float | None:
-        """Messages a second of wall time; None if there are not two, or no times between them."""
-        if not self.has_wall_times:
-            return None
-        span = (self.last_ns - self.first_ns) / NANOSECONDS_PER_SECOND
-        return (self.count - 1) / span if span > 0.0 else None
-
-    @property
-    def largest_gap(self) -> float | None:
-        """Longest wall time from a message to the next, s; None if there are not two."""
-        if self.count < 2 or not self.has_wall_times:
-            return None
-        return self.largest_gap_ns / NANOSECONDS_PER_SECOND
+    type: str  # such as "sensor_msgs/msg/JointState"
+    count: int
+    largest_gap_s: float | None = None  # s of wall time; None unless each message was read
 
 
-@dataclass
-class StateMessages:
-    """Stamps and times of a topic of states, and its simulator's configuration."""
+@dataclass(frozen=True)
+class GainsInForce:
+    """A controller's gains of one joint; None where they were not recorded."""
 
-    stamps_ns: "array[int]" = field(default_factory=lambda: array("q"))
-    published_ns: "array[int]" = field(default_factory=lambda: array("q"))
-    has_wall_times: bool = True  # False: times of publishing are simulated log times
-    configuration: str = ""  # JSON, the first that there was; empty if there was none
-    has_topic: bool = False  # whether there is a topic of states
+    joint: str
+    p: float | None  # N m/rad or N/m
+    d: float | None  # N m s/rad or N s/m
+    i: float | None  # N m/(rad s) or N/(m s)
+    limit: float | None  # N m or N; infinite: none
 
-    def add(self, message: RecordedMessage) -> None:
-        """Add a state's stamp, which is in the header, at the message's beginning."""
-        raw = message.raw
-        if len(raw) >= _HEADER_BYTES:
-            order = "<" if raw[1] & 1 else ">"
-            seconds, nanoseconds = struct.unpack_from(f"{order}iI", raw, 4)
-            self.stamps_ns.append(seconds * NANOSECONDS_PER_SECOND + nanoseconds)
-            self.published_ns.append(message.sent_ns)
-            self.has_wall_times &= message.published_ns is not None
 
-    def configure(self, message: RecordedMessage) -> None:
-        """Keep a simulator's configuration, if it can be read."""
-        with suppress(MessageError):
-            self.configuration = self.configuration or decode_string(message.raw)
+@dataclass(frozen=True)
+class CharacterContents:
+    """A character, as its simulator and its controller have described it at the start."""
+
+    name: str  # its topics' namespace
+    character: str
+    degrees_of_freedom: int
+    mass: float  # kg
+    rate_hz: int
+    mode: str | None
+    versions: dict[str, str]
+    law: str | None  # None: no controller said it
+    gains: list[GainsInForce]
+    states: int  # messages; a state that was published again counts again
 
 
 @dataclass(frozen=True)
 class Contents:
     """A bag as it lies on the disk."""
 
-    bag: Path
+    bag: str
     files: dict[str, int]  # bytes of each
+    size_bytes: int
     storage: str
     compression: str
-    version: int | None  # that of metadata.yaml
+    metadata_version: int | None
     ros_distro: str
+    forked_from: ForkedFrom | None
+    start_ns: int | None  # wall time of the first message
+    wall_time_s: float | None  # from the first message to the last
+    sim_time_s: float | None  # by the number of states, or exactly if each message was read
     topics: tuple[TopicContents, ...]  # by name
-    states: dict[str, StateMessages]  # by namespace
-    forked_from: ForkedFrom | None = None
-
-    @property
-    def has_wall_times(self) -> bool:
-        """Whether times are of the wall clock, and not simulated."""
-        return all(topic.has_wall_times for topic in self.topics)
-
-    @property
-    def start_ns(self) -> int | None:
-        """Wall time of the first message; None if not known."""
-        found = [topic.first_ns for topic in self.topics if topic.count]
-        return min(found, default=None) if self.has_wall_times else None
-
-    @property
-    def wall_time(self) -> float | None:
-        """From the first message to the last, s of wall time; None if not known."""
-        if not self.has_wall_times:
-            return None
-        last = max((topic.last_ns for topic in self.topics if topic.count), default=0)
-        return (last - (self.start_ns or 0)) / NANOSECONDS_PER_SECOND
+    characters: tuple[CharacterContents, ...]  # by name
+    lacks: str | None  # why nothing more is known
 
 
 def read_contents(path: Path) -> Contents:
     """Read the contents of a run's bag, or of any bag or one file of a bag.
 
     Raises:
-        RecordingError: there is no complete bag, or it is damaged.
+        RecordingError: there is no complete bag, or it is damaged in what is read of it.
     """
-    bag = find_bag(path)
-    found: dict[str, TopicContents] = {}
-    states: dict[str, StateMessages] = {}
-    readers: dict[str, Callable[[RecordedMessage], None] | None] = {}  # by topic
-    for message in read_messages(bag):  # raises an error where the bag is none
-        name = message.topic
-        if name not in found:
-            found[name] = TopicContents(name, message.type_name)
-            readers[name] = _reader(name, message.type_name, states)
-        found[name].add(message)
-        reader = readers[name]
-        if reader is not None:
-            reader(message)
-    metadata = _metadata(bag)
-    for name, type_name in _listed_topics(metadata).items():
-        found.setdefault(name, TopicContents(name, type_name))
-    inside = sorted(bag.iterdir()) if bag.is_dir() else [bag]
-    version = metadata.get("version")
+    path = find_bag(path)
+    with open_bag(path) as bag:
+        metadata, types, counted = bag.metadata.content, bag.types, bag.statistics()
+        texts = _first_texts(bag)
+    characters = tuple(_characters(texts, counted.counts))
+    lengths = [(each.states - 1) / each.rate_hz for each in characters if each.states]
+    inside = sorted(path.iterdir()) if path.is_dir() else [path]
+    files = {file.name: file.stat().st_size for file in inside if file.is_file()}
+    version, custom = metadata.get("version"), metadata.get("custom_data")
+    has_times = bool(counted.counts) and not bag.has_simulated_log_times
+    span = (counted.last_ns - counted.first_ns) / NANOSECONDS_PER_SECOND
     return Contents(
-        bag=bag,
-        files={file.name: file.stat().st_size for file in inside if file.is_file()},
-        storage=_storage(metadata),
+        bag=str(path),
+        files=files,
+        size_bytes=sum(files.values()),
+        storage=str(metadata.get("storage_identifier") or storage_of(map(str, bag.metadata.files))),
         compression=_compression(inside, metadata),
-        version=version if isinstance(version, int) else None,
+        metadata_version=version if isinstance(version, int) else None,
         ros_distro=str(metadata.get("ros_distro") or "unknown"),
-        topics=tuple(found[name] for name in sorted(found)),
-        states={name: of for name, of in sorted(states.items()) if of.has_topic},
-        forked_from=_forked_from(metadata),
+        forked_from=read_forked_from(custom.get(KEY)) if isinstance(custom, dict) else None,
+        start_ns=counted.first_ns if has_times else None,
+        wall_time_s=span if has_times else None,
+        sim_time_s=max(lengths, default=None),
+        topics=tuple(
+            TopicContents(name, kind, counted.counts.get(name, 0))
+            for name, kind in sorted({**_listed_topics(metadata), **types}.items())
+        ),
+        characters=characters,
+        lacks=None if characters else _what_is_lacking(path, types),
     )
 
 
-def _reader(
-    topic: str, type_name: str, states: dict[str, StateMessages]
-) -> Callable[[RecordedMessage], None] | None:
-    """The method that reads a topic's messages; None for a topic that is only counted."""
-    whole = f"/{topic.lstrip('/')}"
-    if type_name == _STATE_TYPE and whole.endswith(f"/{_STATES}"):
-        of = states.setdefault(whole.removesuffix(_STATES).strip("/"), StateMessages())
-        of.has_topic = True
-        return of.add
-    if type_name == _TEXT_TYPE and whole.endswith(f"/{_CONFIGURATION}"):
-        namespace = whole.removesuffix(_CONFIGURATION).strip("/")
-        return states.setdefault(namespace, StateMessages()).configure
+def _what_is_lacking(bag: Path, types: Mapping[str, str]) -> str:
+    if is_own(types):
+        return f"bag {bag}: what is on '{_SIMULATOR}' is no configuration of this project's"
+    return describe_foreign(bag, types)
+
+
+def _first_texts(bag: OpenBag) -> dict[str, str]:
+    """The first configuration on each topic of simulators and controllers."""
+    names = [
+        name
+        for name, kind in sorted(bag.types.items())
+        if kind == topics.CONFIGURATION.type_name
+        and f"/{name}".endswith((f"/{_SIMULATOR}", f"/{_CONTROLLER}"))
+    ]
+    texts: dict[str, str] = {}
+    for message in bag.messages(names) if names else ():
+        with suppress(MessageError):
+            texts.setdefault(message.topic, decode_string(message.raw))
+    return texts
+
+
+def _characters(texts: Mapping[str, str], counts: Mapping[str, int]) -> Iterator[CharacterContents]:
+    """The characters whose simulators have said what they are.
+
+    Args:
+        texts: Configurations of simulators and controllers, by topic.
+        counts: Numbers of messages, by topic.
+    """
+    for topic, text in texts.items():
+        below = topic.removesuffix(_SIMULATOR)
+        if f"/{topic}".endswith(f"/{_SIMULATOR}"):
+            with suppress(MessageError, ConfigurationError):  # it is another maker's
+                known = configuration.parse(text)
+                controller = _parameters(texts.get(below + _CONTROLLER, ""))
+                mode = known.parameters.get("mode")
+                yield CharacterContents(
+                    name=below.strip("/"),
+                    character=known.character,
+                    degrees_of_freedom=known.layout.size,
+                    mass=known.mass,
+                    rate_hz=_rate(known),
+                    mode=mode if isinstance(mode, str) else None,
+                    versions=known.versions,
+                    law=describe_law(controller),
+                    gains=_gains(controller, known.layout) if controller else [],
+                    states=counts.get(below + _STATES, 0),
+                )
+
+
+def _rate(known: RunConfiguration) -> int:
+    rate = known.parameters.get("rate")
+    if not isinstance(rate, int):
+        raise MessageError(f"the simulator's 'rate' is {rate}, not a number")
+    return TickClock(rate).rate_hz
+
+
+def _parameters(text: str) -> dict[str, Any]:
+    """The parameters in a controller's configuration; none where it is another maker's."""
+    try:
+        return dict(json.loads(text)["parameters"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return {}
+
+
+def _gains(parameters: Mapping[str, Any], layout: JointLayout) -> list[GainsInForce]:
+    """Gains and limits of each vector of a layout, times the parameters that scale them."""
+    names = [ROOT, ROOT_TORQUE] if layout.has_floating_base else []
+    names += [joint.name for joint in layout.joints if joint.type is not JointType.FLOATING]
+    assistance = float(bool(parameters.get("root_assistance", True)))
+
+    def gain(name: str, kind: str) -> float | None:
+        scale = read_number(parameters.get(f"gain_scale.{kind}", 1.0)) or 0.0
+        value = read_number(parameters.get(f"gains.{name}.{kind}"))
+        return value and value * (assistance if name in (ROOT, ROOT_TORQUE) else scale)
+
+    return [
+        GainsInForce(
+            name,
+            p=gain(name, "p"),
+            d=gain(name, "d"),
+            i=gain(name, "i"),
+            limit=_limit(parameters.get(f"effort_limit.{name}", "unknown")),
+        )
+        for name in names
+    ]
+
+
+def _limit(value: object) -> float | None:
+    """An effort limit as JSON has it, where no limit is null; None of what is no number."""
+    return math.inf if value is None else read_number(value)
+
+
+def read_number(value: object) -> float | None:
+    """A number of a message from any node; None if it is none."""
+    with suppress(OverflowError):
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return float(value)
     return None
 
 
-def _metadata(bag: Path) -> dict[str, Any]:
-    if bag.is_file():  # a file without the rest of its directory
-        storages = {suffix: storage for storage, suffix in SUFFIXES.items()}
-        return {"storage_identifier": storages.get(bag.suffix, "unknown")}
-    try:
-        content = load_metadata(bag)
-    except (OSError, ValueError, KeyError, TypeError, RecordingError) as error:
-        raise RecordingError(f"cannot read {bag / METADATA}") from error
-    return content if isinstance(content, dict) else {}
-
-
-def _storage(metadata: dict[str, Any]) -> str:
-    """The storage that the metadata says, or else the suffix of its files."""
-    named = metadata.get("storage_identifier") or storage_of(
-        metadata.get("relative_file_paths") or ()
-    )
-    return str(named)
-
-
-def _forked_from(metadata: dict[str, Any]) -> ForkedFrom | None:
-    """Where a forked run comes from."""
-    custom = metadata.get("custom_data")
-    return read_forked_from(custom.get(KEY)) if isinstance(custom, dict) else None
-
-
-def _listed_topics(metadata: dict[str, Any]) -> dict[str, str]:
+def _listed_topics(metadata: Mapping[str, Any]) -> dict[str, str]:
     """Type by name of the topics that the metadata lists; some may have no messages."""
     try:
         listed = [entry["topic_metadata"] for entry in metadata["topics_with_message_count"]]
@@ -212,7 +238,7 @@ def _listed_topics(metadata: dict[str, Any]) -> dict[str, str]:
         return {}
 
 
-def _compression(files: list[Path], metadata: dict[str, Any]) -> str:
+def _compression(files: list[Path], metadata: Mapping[str, Any]) -> str:
     """The compression of a bag's files: of whole files, single messages, or MCAP's chunks."""
     form, mode = metadata.get("compression_format"), metadata.get("compression_mode")
     if form:

@@ -32,11 +32,3 @@ def span_maxima(values: FloatArray, most: int) -> FloatArray:
     """The largest value (m, k) of each column in each of at most `most` spans of rows (t, k)."""
     maxima: FloatArray = np.fmax.reduceat(values, span_starts(len(values), most))
     return maxima
-
-
-def span_means(values: FloatArray, most: int) -> FloatArray:
-    """The mean (m, k) of each column in each of at most `most` spans of rows (t, k)."""
-    starts = span_starts(len(values), most)
-    lengths = np.diff(starts, append=len(values))
-    means: FloatArray = np.add.reduceat(values, starts) / lengths[:, np.newaxis]
-    return means

@@ -24,7 +24,7 @@ table { border-collapse: collapse; margin: .7rem 0; }
 caption { text-align: left; font-weight: 600; padding: .3rem 0; white-space: nowrap; }
 th, td { border-bottom: 1px solid var(--line); padding: .15rem .9rem .15rem 0;
          text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
-th:first-child, td:first-child, table.facts td { text-align: left; }
+th:first-child, td:first-child, td:nth-child(2):last-child { text-align: left; }
 tr:nth-child(even) td { background: var(--soft); }
 img { max-width: 100%; height: auto; background: white; border-radius: 6px; }
 figure { margin: .7rem 0; } figcaption { font-size: .85rem; opacity: .75; }
@@ -32,21 +32,20 @@ figure { margin: .7rem 0; } figcaption { font-size: .85rem; opacity: .75; }
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1rem 0; }
 .tiles div { background: var(--soft); border-radius: 6px; padding: .6rem 1rem; min-width: 9rem; }
 .tiles b { display: block; font-size: 1.3rem; }
-nav a { margin-right: 1rem; }
 @media print {
   :root { color-scheme: light; }
   body { margin: 0; max-width: none; font-size: 10pt; }
-  figure, tr, .tiles { break-inside: avoid; } h2, h3 { break-after: avoid; } nav { display: none; }
+  figure, tr, .tiles { break-inside: avoid; } h2, h3 { break-after: avoid; }
 }
 """
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts; without columns, each row is a name and its value."""
+    """Rows of texts below the names of their columns."""
 
     rows: Sequence[Sequence[str]]
-    columns: Sequence[str] = ()
+    columns: Sequence[str]
     caption: str = ""
 
 
@@ -61,45 +60,30 @@ class Illustration:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page, in the order of the fields."""
+    """A part of the page: pictures, the verdict with its tiles, tables, and remarks."""
 
     title: str
     illustrations: Sequence[Illustration] = ()
     tables: Sequence[Table] = ()
     remarks: Sequence[str] = ()
-    verdict: str = ""  # a sentence or two after the pictures
+    verdict: str = ""  # a sentence after the pictures
     tiles: Sequence[tuple[str, str]] = ()  # name and value of figures that belong to the verdict
+    chapter: str = ""  # a heading above, where a chapter begins
 
 
-@dataclass(frozen=True)
-class Chapter:
-    """All sections of one character, or of the whole bag."""
-
-    title: str  # "" for no heading
-    sections: Sequence[Section]
-
-
-def render_page(title: str, chapters: Sequence[Chapter]) -> str:
+def render_page(title: str, sections: Sequence[Section]) -> str:
     """The page as HTML; all texts are escaped."""
-    titles = [chapter.title for chapter in chapters]
-    links = "".join(f'<a href="#c{n}">{escape(text)}</a>' for n, text in enumerate(titles) if text)
-    body = "".join(_chapter(number, chapter) for number, chapter in enumerate(chapters))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
         f"{GENERATOR}/>\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        f"<h1>{escape(title)}</h1>\n<nav>{links}</nav>\n{body}</body>\n</html>\n"
+        f"<h1>{escape(title)}</h1>\n{''.join(map(_section, sections))}</body>\n</html>\n"
     )
 
 
-def _chapter(number: int, chapter: Chapter) -> str:
-    head = f'<h2 id="c{number}">{escape(chapter.title)}</h2>\n' if chapter.title else ""
-    return head + "".join(map(_section, chapter.sections))
-
-
 def _section(section: Section) -> str:
-    parts = ["<section>\n"]
+    parts = [f"<h2>{escape(section.chapter)}</h2>\n"] if section.chapter else []
     if section.title:
         parts.append(f"<h3>{escape(section.title)}</h3>\n")
     parts += map(_figure, section.illustrations)
@@ -110,7 +94,7 @@ def _section(section: Section) -> str:
         parts.append(f'<div class="tiles">{"".join(tiles)}</div>\n')
     parts += map(_table, section.tables)
     parts += [f"<p>{escape(remark)}</p>\n" for remark in section.remarks]
-    return "".join([*parts, "</section>\n"])
+    return "".join(parts)
 
 
 def _figure(illustration: Illustration) -> str:
@@ -123,19 +107,16 @@ def _figure(illustration: Illustration) -> str:
 
 
 def _table(table: Table) -> str:
-    rows, head = table.rows, ""
-    if table.columns:
-        known = [
-            column
-            for column in range(len(table.columns))
-            if column == 0 or any(row[column] != NOT_KNOWN for row in rows)
-        ]
-        head = _row("th", [table.columns[column] for column in known])
-        rows = [[row[column] for column in known] for row in rows]
+    """A table of the columns that have a value."""
+    known = [
+        column
+        for column in range(len(table.columns))
+        if column == 0 or any(row[column] != NOT_KNOWN for row in table.rows)
+    ]
+    head = _row("th", [table.columns[column] for column in known])
+    body = "".join(_row("td", [row[column] for column in known]) for row in table.rows)
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
-    body = "".join(_row("td", row) for row in rows)
-    kind = "" if table.columns else ' class="facts"'
-    return f'<div class="wide"><table{kind}>{caption}{head}{body}</table></div>\n'
+    return f'<div class="wide"><table>{caption}{head}{body}</table></div>\n'
 
 
 def _row(tag: str, cells: Sequence[str]) -> str:

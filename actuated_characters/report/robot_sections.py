@@ -6,6 +6,7 @@ import numpy as np
 
 from actuated_characters.bags.robots.reading import RobotRecording
 from actuated_characters.report import charts
+from actuated_characters.report.events import Event
 from actuated_characters.report.page import NOT_KNOWN, Section, Table
 from actuated_characters.report.sections import CharacterReport
 
@@ -23,32 +24,24 @@ class RobotReport(CharacterReport):
     @property
     def makers(self) -> list[Callable[[], Section]]:
         """Functions that make the sections, in their order."""
-        root = [self._root] if self._recording.layout.has_floating_base else []
-        return [self._result, self._positions, *root, self._efforts, self._ticks, self._run]
+        return [self._result, self._positions, self._efforts]
 
-    def _measured(self) -> dict[str, object]:
-        recording = self._recording
-        return {
-            "states": len(recording.stamps_ns),
-            "sim_time_s": float(recording.times[-1]),
-            "degrees_of_freedom": recording.layout.size,
-            "fell": None,
-        }
+    def _measured_events(self) -> list[Event]:
+        return []
 
-    def _result(self) -> Section:
-        recording = self._recording
-        pictures, remarks = self._strip()
-        sentence = (
-            f"{len(recording.stamps_ns)} states of '{recording.topic}' over "
-            f"{recording.times[-1]:.4g} s."
-        )
-        return Section("", pictures, remarks=[*recording.remarks, *remarks], verdict=sentence)
+    def _tiles(self) -> list[tuple[str, str]]:
+        return []
+
+    def _verdict(self) -> str:
+        recording, span = self._recording, float(self._recording.times[-1])
+        count = len(recording.stamps_ns)
+        rate = f", {(count - 1) / span:.4g} a second" if span > 0.0 else ""
+        return f"{count} states of '{recording.topic}' over {span:.4g} s{rate}."
 
     def _positions(self) -> Section:
         recording, rows, panels = self._recording, [], []
         joints = {link.joint.name: link.joint for link in recording.character.links}
-        actuated = recording.layout.actuated_joint_names
-        for name in actuated:
+        for name in recording.layout.actuated_joint_names:
             joint = recording.layout.joint(name)
             values, limits = recording.position[:, joint.entries], joints[name]
             unit = "m" if joint.type.value == "prismatic" else "rad"
@@ -61,18 +54,6 @@ class RobotReport(CharacterReport):
         if not rows:
             return Section("positions", remarks=["The robot has no joints that move."])
         table = Table(rows, _COLUMNS, "positions, and the limits of the joints")
-        picture = self._series(POSITIONS, "positions of the joints over time", panels, columns=3)
+        figure = charts.series_chart(self._timeline, panels)
+        picture = self._drawn(figure, POSITIONS, "positions of the joints over time")
         return Section("positions", [picture], [table])
-
-    def _run(self) -> Section:
-        recording = self._recording
-        span = float(recording.times[-1])
-        rate = f"{(len(recording.times) - 1) / span:.4g} Hz" if span > 0.0 else NOT_KNOWN
-        facts = [
-            ("character", recording.character.name),
-            ("degrees of freedom", str(recording.layout.size)),
-            ("mass", f"{recording.character.mass:.4g} kg"),
-            ("states", str(len(recording.times))),
-            ("mean rate", rate),
-        ]
-        return Section("robot", tables=[Table(facts)])

@@ -1,7 +1,7 @@
-"""The sections of a report on one character: the result, then charts and tables of each topic."""
+"""The sections of a report on one character: verdict, errors, efforts, contacts and events."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -9,33 +9,26 @@ import numpy as np
 from matplotlib.image import imsave
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.metrics.error_measures import (
-    effort_sizes,
-    limit_shares,
-    vector_kinds,
-)
+from actuated_characters.metrics.error_measures import effort_sizes, limit_shares, vector_kinds
 from actuated_characters.metrics.recording_metrics import (
     contact_series,
-    gravities,
     measure_recording,
+    saturated_shares,
     tracking_errors,
 )
 from actuated_characters.render.stills import strip
 from actuated_characters.report import charts
-from actuated_characters.report.facts import late_facts, pace_period, run_facts
-from actuated_characters.report.metrics_plot import NOMINAL, describe_metrics
+from actuated_characters.report.events import Event, find_events
+from actuated_characters.report.metrics_plot import NOMINAL
 from actuated_characters.report.page import NOT_KNOWN, Illustration, Section, Table
-from actuated_characters.report.planning import foresight, plan_chart
-from actuated_characters.report.reactions import TRACK, mode_line, thrown_line
-from actuated_characters.report.timing import lateness, pauses, wall_steps
-from actuated_characters.report.verdict import describe_end, tiles
+from actuated_characters.report.verdict import describe_end, describe_law, tiles
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NAMES = ("strip", "errors", "root", "efforts", "contacts", "ground", "plans", "histogram", "ticks")
+NAMES = ("strip", "errors", "efforts", "contacts")
 """Names of the pictures of a run."""
 
 STILLS = 8
@@ -49,33 +42,25 @@ _STATISTICS = ("mean", f"{_PERCENTILE} %", "largest")
 class CharacterReport:
     """Makes the sections of one recording."""
 
-    def __init__(self, recording: Recording, prefix: str = "", stills: int = STILLS) -> None:
-        """`prefix` comes before the names of the pictures; `stills` is the number of poses."""
+    def __init__(
+        self, recording: Recording, prefix: str = "", stills: int = STILLS, chapter: str = ""
+    ) -> None:
+        """`prefix` comes before names of pictures; `stills` are poses; `chapter` is a heading."""
         self._recording, self._prefix, self._stills = recording, prefix, stills
-        self._facts = facts = run_facts(recording)
+        self._chapter = chapter
+        reference = recording.reference_position
+        self._has_reference = bool(np.isfinite(reference).all(axis=1).any())
         self._kinds = vector_kinds(recording.layout)
         self._names = recording.character.vector_names
-        self._limits = recording.character.effort_limits()
-        self._errors = tracking_errors(recording)
-        self._metrics = self._measured()
-        reacts = any(span.mode != TRACK for span in facts.modes)
-        self._modes = facts.modes if reacts else []
-        times = recording.published_ns if recording.has_wall_times else recording.published_ns[:0]
-        self._pauses = pauses(times)
-        breaks = recording.episode_rows[1:]
-        marks = charts.Marks(
-            pushes=[(push.start, push.duration) for push in facts.pushes],
-            resets=recording.times[breaks].tolist(),
-            changes=sorted({change.time for change in facts.changes}),
-            pauses=recording.times[self._pauses].tolist(),
-            throws=[throw.start for throw in facts.throws],
-            modes=[(span.start, span.duration, span.label) for span in self._modes],
-        )
+        self._events = self._measured_events()
+        marks, breaks = charts.Marks(self._events), recording.episode_rows[1:]
         self._timeline = charts.Timeline(recording.times, breaks, marks)
 
-    def _measured(self) -> dict[str, object]:
-        """The figures of the recording, by name."""
-        return measure_recording(self._recording)[0]
+    def _measured_events(self) -> list[Event]:
+        """Measure the run; return what happened in it."""
+        self._metrics, _ = measure_recording(self._recording)
+        fell_at = self._metrics["fell_at_s"]
+        return find_events(self._recording, fell_at if isinstance(fell_at, float) else None)
 
     @property
     def title(self) -> str:
@@ -88,77 +73,72 @@ class CharacterReport:
 
     @property
     def makers(self) -> list[Callable[[], Section]]:
-        """Functions that make the sections, in their order; each takes about a second."""
-        plans = [self._plans] if self._recording.plans else []
-        root = [self._root] if self._recording.layout.has_floating_base else []
-        first = [self._result, self._tracking, *root, self._efforts, self._contacts]
-        return [*first, *plans, self._events, self._ticks, self._run]
-
-    def sections(self) -> Iterator[Section]:
-        """All sections, in their order."""
-        return (make() for make in self.makers)
+        """Functions that make the sections, in their order."""
+        return [self._result, self._tracking, self._efforts, self._contacts, self._listed_events]
 
     def _result(self) -> Section:
         pictures, remarks = self._strip()
-        sentence = describe_end(float(self._recording.times[-1]), self._facts, self._metrics)
-        return Section("", pictures, remarks=remarks, verdict=sentence, tiles=tiles(self._metrics))
+        verdict, shown = self._verdict(), self._tiles()
+        return Section("", pictures, [], remarks, verdict, shown, self._chapter)
+
+    def _verdict(self) -> str:
+        controller = self._recording.controller
+        law = describe_law(controller[0].parameters) if controller else None
+        return describe_end(self._metrics, law, has_reference=self._has_reference)
+
+    def _tiles(self) -> list[tuple[str, str]]:
+        return tiles(self._metrics)
 
     def _strip(self) -> tuple[list[Illustration], list[str]]:
         """The picture of the character, or a note why there is none."""
         recording = self._recording
         if not self._stills:
             return [], []
-        has_ghost = bool(np.isfinite(recording.reference_position).all(axis=1).any())
         try:
-            poses = strip(recording, self._stills, ghost=has_ghost and bool(recording.layout.size))
+            has_ghost = self._has_reference and bool(recording.layout.size)
+            poses = strip(recording, self._stills, ghost=has_ghost)
         except ActuatedCharactersError as error:
             return [], [f"The character cannot be drawn: {error}"]
         content = BytesIO()
         imsave(content, poses, format="png")
-        ghost = "; the reference is the ghost" if has_ghost else ""
+        ghost = "; the reference is the ghost" if self._has_reference else ""
         text = f"{recording.character.name}, evenly from the first state to the last{ghost}"
         return [Illustration(self._prefix + "strip", content.getvalue(), text)], []
 
     def _tracking(self) -> Section:
-        title = "tracking error"
-        if not self._facts.reference:
-            return Section(title, remarks=["The recording has no reference."])
-        columns = list(zip(self._names, self._kinds.units, self._errors.T, strict=True))
+        title, errors = "tracking error", tracking_errors(self._recording)
+        if np.isnan(errors).all():
+            own = "Its reference is where it was itself, which tells no error."
+            remark = own if self._has_reference else "The recording has no reference."
+            return Section(title, remarks=[remark])
+        columns = list(zip(self._names, self._kinds.units, errors.T, strict=True))
         rows = [(name, unit, *_statistics(values)) for name, unit, values in columns]
         table = Table(rows, ("joint", "unit", *_STATISTICS), "distance from the reference")
-        panels = []
-        for column, (name, unit, values) in enumerate(columns):
-            panels.append(charts.Panel(f"error ({unit})", {name: values}, name, from_zero=True))
-            if unit == "m":
-                panels.append(self._position_panel(column))
-        text = "distance of root and joints from the reference, positions of sliders, root height"
-        return Section(title, [self._series("errors", text, panels, columns=3)], [table])
-
-    def _position_panel(self, column: int) -> charts.Panel:
-        """A slider's position, or the root's height, and that of its reference."""
-        recording, entry = self._recording, int(self._recording.layout.vector_starts[column])
-        title = self._names[column] if self._kinds.sliding[column] else "root height"
-        entry += 0 if self._kinds.sliding[column] else 2
-        positions = (recording.position[:, entry], recording.reference_position[:, entry])
-        lines = dict(zip(("simulated", "reference"), positions, strict=True))
-        return charts.Panel("position (m)", lines, title)
+        panels = [
+            charts.Panel(f"error ({unit})", {name: values}, name, from_zero=True)
+            for name, unit, values in columns
+        ]
+        figure = charts.series_chart(self._timeline, panels)
+        picture = self._drawn(figure, "errors", "distance of root and joints from the reference")
+        return Section(title, [picture], [table])
 
     def _efforts(self) -> Section:
         title, recording = "torques against limits", self._recording
         sizes = effort_sizes(recording.layout, recording.effort)
         if np.isnan(sizes).all():
             return Section(title, remarks=["The recording has no efforts."])
-        rows = []
-        for name, unit, limit, values in zip(
-            self._names, self._kinds.units, self._limits, sizes.T, strict=True
+        limits = recording.character.effort_limits()
+        shares, rows = limit_shares(sizes, limits), []
+        for name, unit, limit, at_limit, values in zip(
+            self._names, self._kinds.units, limits, saturated_shares(shares), sizes.T, strict=True
         ):
-            share = self._facts.saturated_shares.get(name)
-            of_ticks = NOT_KNOWN if share is None else f"{100.0 * share:.3g} %"
             kind = {"rad": "N m", "m": "N"}[unit]
-            rows.append((name, kind, *_statistics(values), _shown(limit), of_ticks))
+            limited = (NOT_KNOWN, NOT_KNOWN)
+            if math.isfinite(limit):
+                limited = (f"{limit:.4g}", f"{100.0 * at_limit:.3g} %")
+            rows.append((name, kind, *_statistics(values), *limited))
         columns = ("joint", "unit", *_STATISTICS, "limit", "at the limit")
         table = Table(rows, columns, "applied efforts, and the share of ticks at the limit")
-        shares = limit_shares(sizes, self._limits)
         largest = np.nanmax(np.vstack((shares, np.zeros(len(self._names)))), axis=0)
         near = np.flatnonzero(self._kinds.actuated & (largest > NOMINAL))
         if not len(near):
@@ -167,12 +147,6 @@ class CharacterReport:
         figure = charts.effort_chart(self._timeline, shares[:, near], names)
         text = "the largest share of its limit that each joint's effort reached, over time"
         return Section(title, [self._drawn(figure, "efforts", text)], [table])
-
-    def _root(self) -> Section:
-        recording = self._recording
-        position, desired = recording.position[:, :3], recording.reference_position[:, :3]
-        figure = charts.path_chart(self._timeline, position, desired)
-        return Section("root path", [self._drawn(figure, "root", "path of the root from above")])
 
     def _contacts(self) -> Section:
         recording = self._recording
@@ -185,107 +159,24 @@ class CharacterReport:
             return Section("contacts", remarks=[remark])
         if not series.links:
             return Section("contacts", remarks=["No link touched anything."])
-        gravity = gravities(recording)
-        weight = recording.character.mass * np.where(gravity > 0.0, gravity, np.nan)
-        force = series.vertical_force / weight
-        curve = charts.Panel("vertical force / weight", {"vertical force / weight": force})
-        chart = charts.contact_chart(self._timeline, series.touching, series.links)
-        pictures = [
-            self._drawn(chart, "contacts", "links in contact over time"),
-            self._series("ground", "vertical force of all contacts", [curve]),
-        ]
+        figure = charts.contact_chart(self._timeline, series.touching, series.links)
         rows = [
             (link, f"{100.0 * share:.3g} %")
             for link, share in zip(series.links, series.touching.mean(axis=0), strict=True)
         ]
         table = Table(rows, ("link", "of all ticks"), "links in contact")
-        return Section("contacts", pictures, [table])
+        picture = self._drawn(figure, "contacts", "links in contact over time")
+        return Section("contacts", [picture], [table])
 
-    def _plans(self) -> Section:
-        foreseen = foresight(self._recording)
-        rows = [(f"{ahead:.4g}", *_statistics(errors)) for ahead, errors in foreseen.items()]
-        caption = "distance of the centre of mass from its prediction by a plan (m)"
-        table = Table(rows[:_MOST_LISTED], ("after (s)", *_STATISTICS), caption)
-        figure = plan_chart(self._recording, self._timeline.marks)
-        text = "predicted and simulated path of the centre of mass, and costs of plans"
-        return Section("plans", [self._drawn(figure, "plans", text)], [table])
-
-    def _events(self) -> Section:
-        facts, recording = self._facts, self._recording
-        steps = wall_steps(recording.published_ns)
-        rows = [(e.start, f"episode of {e.duration:.4g} s") for e in facts.episodes]
-        rows += [
-            (p.start, f"push on {p.link} for {p.duration:.3g} s: {p.impulse:.4g} N s")
-            for p in facts.pushes
-        ]
-        rows += [(throw.start, thrown_line(throw)) for throw in facts.throws]
-        rows += [(span.start, mode_line(span)) for span in self._modes]
-        rows += [(c.time, c.line) for c in facts.changes]
-        rows += [
-            (float(recording.times[row]), f"pause of {steps[row]:.3g} s of wall time")
-            for row in self._pauses
-        ]
-        listed = [(f"{time:.4f}", text) for time, text in sorted(rows)]
-        remarks = []
-        if len(listed) > _MOST_LISTED:
-            remarks.append(f"The first {_MOST_LISTED} of {len(listed)}.")
-        if not facts.pushes_recorded:
+    def _listed_events(self) -> Section:
+        rows = [(f"{event.start:.4f}", event.text) for event in self._events]
+        remarks = [] if rows else ["There were none."]
+        if len(rows) > _MOST_LISTED:
+            remarks.append(f"The first {_MOST_LISTED} of {len(rows)}.")
+        if not self._recording.applied_wrench:
             remarks.append("Pushes were not recorded.")
-        table = Table(listed[:_MOST_LISTED], ("time (s)", "event"))
-        return Section("events", tables=[table], remarks=remarks)
-
-    def _ticks(self) -> Section:
-        title, recording = "tick times", self._recording
-        if not recording.has_wall_times:
-            remark = "Wall times are not known: log times are simulated, and SQLite has no others."
-            return Section(title, remarks=[remark])
-        steps = wall_steps(recording.published_ns)
-        if not len(steps):
-            return Section(title, remarks=["There is one state only."])
-        steps[self._pauses] = np.nan
-        known, period = 1e3 * steps, pace_period(dict(recording.parameters))
-        table_rows = [("wall time from state to state, pauses left out", *_statistics(known))]
-        curves, remarks = {"wall time": known}, []
-        panels = [charts.Panel("wall time (ms)", curves, is_logarithmic=True)]
-        if period:
-            late, due = lateness(recording.published_ns, period), np.full(len(steps), 1e3 * period)
-            curves["period, for reference"] = due
-            of_late = {"lateness": 1e3 * late[1:], "period, for reference": due}
-            panels.append(charts.Panel("lateness (ms)", of_late, "behind the schedule"))
-            table_rows.append(("lateness", *_statistics(1e3 * late[1:])))
-            count = int(late_facts(recording.published_ns, period)["ticks"])
-            remarks.append(f"{count} of {len(steps)} ticks began more than a period late.")
-        pictures = [
-            self._drawn(charts.histogram(known), "histogram", "frequency of tick times"),
-            self._series("ticks", "wall time from state to state", panels),
-        ]
-        return Section(title, pictures, [Table(table_rows, ("ms", *_STATISTICS))], remarks)
-
-    def _run(self) -> Section:
-        character, parameters = self._recording.character, self._recording.parameters
-        facts = [
-            ("character", character.name),
-            ("degrees of freedom", str(self._recording.layout.size)),
-            ("mass", f"{character.mass:.4g} kg"),
-            ("rate", f"{parameters.get('rate')} Hz"),
-            ("mode", str(parameters.get("mode", "unknown"))),
-            ("law", self._facts.law or "not recorded"),
-        ]
-        tables = [Table(facts), Table(describe_metrics(self._metrics), caption="figures")]
-        if self._facts.gains:
-            rows = [
-                (row.joint, *map(_shown, (row.p, row.d, row.i, row.limit)))
-                for row in self._facts.gains
-            ]
-            columns = ("joint", "p", "d", "i", "limit")
-            tables.append(Table(rows, columns, "the controller's gains and limits at the start"))
-        return Section("run", tables=tables)
-
-    def _series(
-        self, name: str, text: str, panels: Sequence[charts.Panel], columns: int = 1
-    ) -> Illustration:
-        figure = charts.series_chart(self._timeline, panels, columns=columns)
-        return self._drawn(figure, name, text)
+        tables = [Table(rows[:_MOST_LISTED], ("time (s)", "event"))] if rows else []
+        return Section("events", tables=tables, remarks=remarks)
 
     def _drawn(self, figure: "Figure", name: str, text: str) -> Illustration:
         return Illustration(self._prefix + name, charts.png(figure), text)
@@ -298,7 +189,3 @@ def _statistics(values: FloatArray) -> Sequence[str]:
         return (NOT_KNOWN,) * len(_STATISTICS)
     numbers = (known.mean(), np.percentile(known, _PERCENTILE), known.max())
     return tuple(f"{number:.4g}" for number in numbers)
-
-
-def _shown(value: float | None) -> str:
-    return NOT_KNOWN if value is None or math.isinf(value) else f"{value:.4g}"

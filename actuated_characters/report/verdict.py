@@ -1,8 +1,7 @@
 """The verdict on a run: a sentence on how it ended, and the metrics that support it."""
 
 from collections.abc import Mapping
-
-from actuated_characters.report.facts import RunFacts
+from typing import Any
 
 _LIMP = "LIMP"  # the mode in which nothing drives the character
 _TILES = (
@@ -13,21 +12,29 @@ _TILES = (
 )
 
 
-def describe_end(length_s: float, facts: RunFacts, metrics: Mapping[str, object]) -> str:
-    """A sentence on how a run of a length in s ended, by its metrics; see `falls`."""
-    length, fell_at = f"{length_s:.4g} s", metrics["fell_at_s"]
+def describe_law(controller: Mapping[str, Any]) -> str | None:
+    """The control law in a controller's parameters, with balance where it is on; None without."""
+    law = controller.get("law")
+    if law is None:
+        return None
+    return f"{law}, balance" if controller.get("balance.enabled") else str(law)
+
+
+def describe_end(metrics: Mapping[str, object], law: str | None, *, has_reference: bool) -> str:
+    """A sentence on how a run ended, by its metrics; see `falls`."""
+    length, fell_at = f"{metrics['sim_time_s']:.4g} s", metrics["fell_at_s"]
     stood = "" if metrics["fell"] is None else " without a fall"
     if isinstance(fell_at, float):
         verdict = f"It fell at {fell_at:.3g} s of {length}"
         if metrics["fell_in_mode"] == _LIMP:
             verdict += ", limp, as its behaviour wants it"
-    elif not facts.reference:
+    elif not has_reference:
         verdict = f"A run of {length} without a reference" + (stood and "," + stood)
     elif metrics["fell"] is not None and metrics["root_error_mean_m"] is None:
         verdict = f"It went on for {length}{stood}; its reference's root is where it was itself"
     else:
         verdict = f"It tracked its reference for {length}{stood}"
-    return verdict + (f" (control law {facts.law})." if facts.law else ".")
+    return verdict + (f" (control law {law})." if law else ".")
 
 
 def tiles(metrics: Mapping[str, object]) -> list[tuple[str, str]]:

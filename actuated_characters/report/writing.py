@@ -3,25 +3,20 @@
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from shlex import quote
 
 from actuated_characters.bags.recording import Recording, find_bag
 from actuated_characters.bags.robots.reading import RobotRecording, RobotSource, read_any
 from actuated_characters.recorder.run_directory import REPORT
-from actuated_characters.report.contents import Contents, read_contents
-from actuated_characters.report.page import (
-    GENERATOR,
-    NOT_KNOWN,
-    Chapter,
-    Section,
-    Table,
-    render_page,
-)
+from actuated_characters.report.page import GENERATOR, Section, Table, render_page
 from actuated_characters.report.robot_sections import POSITIONS, RobotReport
 from actuated_characters.report.sections import NAMES, STILLS, CharacterReport
 from msgs_config.errors import RecordingError
 from msgs_config.whole_files import write_whole
 
 PAGE = "index.html"
+
+_ANY = RobotSource()  # all characters of a run, or the robot that a bag names
 
 _PICTURE = re.compile(rf"([0-9]+-[A-Za-z0-9_]*-)?({'|'.join((*NAMES, POSITIONS))})\.png")
 _UNFIT = re.compile("[^A-Za-z0-9_]+")  # what the name of a file must not have
@@ -36,7 +31,7 @@ def write_report(
     *,
     stills: int = STILLS,
     progress: Progress = lambda done, total: None,
-    source: RobotSource | None = None,
+    source: RobotSource = _ANY,
     told: Callable[[Sequence[Recording]], None] = lambda recordings: None,
 ) -> Path:
     """Report on a run's directory, or on a bag; returns the page.
@@ -56,34 +51,38 @@ def write_report(
         ActuatedCharactersError: a message is not what its topic should carry.
     """
     directory = output or default_directory(path)
-    old = _old_files(directory)
-    recordings, contents = read_any(path, source or RobotSource()), read_contents(path)
+    _check_directory(directory)
+    recordings = read_any(path, source)
     told(recordings)
     reports = _plan_reports(recordings, stills)
     done, total = 0, sum(len(report.makers) for report in reports)
     progress(done, total)
-    chapters, files = list[Chapter](), dict[str, bytes]()
-    for recording, report in zip(recordings, reports, strict=True):
-        sections = []
+    sections, files = list[Section](), dict[str, bytes]()
+    for report in reports:
         for make in report.makers:
             sections.append(make())
             files |= {f"{each.name}.png": each.png for each in sections[-1].illustrations}
             progress(done := done + 1, total)
-        title = recording.name or recording.character.name
-        chapters.append(Chapter(title if len(recordings) > 1 else "", sections))
-    chapters.append(Chapter("the bag", [_bag_section(contents)]))
-    page = render_page(", ".join(report.title for report in reports), chapters)
-    _write(directory, {PAGE: page.encode("utf-8")} | files, old)
+    which = "".join(f" --{name} {quote(value)}" for name, value in vars(source).items() if value)
+    run = quote(str(path))
+    rest = [
+        (f"actuated_characters view {run}{which}", "the motion, its reference, plots over time"),
+        (f"actuated_characters info {run} --ticks", "topics, gains, times between messages"),
+    ]
+    sections.append(Section("the rest", tables=[Table(rest, ("command", "shows"))]))
+    page = render_page(", ".join(report.title for report in reports), sections)
+    _write(directory, {PAGE: page.encode("utf-8")} | files)
     return directory / PAGE
 
 
 def _plan_reports(recordings: Sequence[Recording], stills: int) -> list[CharacterReport]:
-    """The report of each character; of several, each file's name has the character's in it."""
+    """The report of each character; of several, each is a chapter, and named in its files."""
     reports = []
     for number, recording in enumerate(recordings, start=1):
-        prefix = f"{number}-{_UNFIT.sub('_', recording.name)}-" if len(recordings) > 1 else ""
+        name = recording.name if len(recordings) > 1 else ""
+        prefix = f"{number}-{_UNFIT.sub('_', name)}-" if name else ""
         kind = RobotReport if isinstance(recording, RobotRecording) else CharacterReport
-        reports.append(kind(recording, prefix, stills))
+        reports.append(kind(recording, prefix, stills, chapter=name))
     return reports
 
 
@@ -95,65 +94,26 @@ def default_directory(path: Path) -> Path:
     return whole.with_name(f"{whole.name}-{REPORT}")
 
 
-def _old_files(directory: Path) -> list[Path]:
-    """The files of an earlier report.
-
-    Raises:
-        RecordingError: there is something else.
-    """
-    if not directory.exists():
-        return []
-    if not directory.is_dir():
+def _check_directory(directory: Path) -> None:
+    """Raise RecordingError unless a directory is new, empty, or an earlier report's."""
+    if directory.exists() and not directory.is_dir():
         raise RecordingError(f"cannot write the report: {directory} is no directory")
-    present, page = sorted(directory.iterdir()), directory / PAGE
-    foreign = [
-        file
-        for file in present
-        if not file.is_file() or (file != page and not _PICTURE.fullmatch(file.name))
-    ]
-    if present and not foreign and not _is_report(page):
-        foreign = [page] if page in present else present
-    if foreign:
-        raise RecordingError(f"{directory} holds other files than a report's: {foreign[0].name}")
-    return present
+    present = sorted(directory.iterdir()) if directory.exists() else []
+    page = directory / PAGE
+    is_report = page.is_file() and GENERATOR in page.read_text(encoding="utf-8", errors="replace")
+    if present and not is_report:
+        first = page if page in present else present[0]
+        raise RecordingError(f"{directory} holds other files than a report's: {first.name}")
 
 
-def _is_report(page: Path) -> bool:
-    return page.exists() and GENERATOR in page.read_text(encoding="utf-8", errors="replace")
-
-
-def _bag_section(contents: Contents) -> Section:
-    wall_time = contents.wall_time
-    facts = [
-        ("bag", str(contents.bag)),
-        ("files", ", ".join(f"{name} ({size} bytes)" for name, size in contents.files.items())),
-        ("storage", f"{contents.storage}, compression {contents.compression}"),
-        ("wall time", NOT_KNOWN if wall_time is None else f"{wall_time:.6g} s"),
-    ]
-    if contents.forked_from is not None:
-        facts.append(("forked from", str(contents.forked_from)))
-    rows = [
-        (
-            topic.name,
-            topic.type_name,
-            str(topic.count),
-            NOT_KNOWN if topic.rate_hz is None else f"{topic.rate_hz:.4g}",
-            NOT_KNOWN if topic.largest_gap is None else f"{topic.largest_gap:.4g}",
-        )
-        for topic in contents.topics
-    ]
-    columns = ("topic", "type", "messages", "per s", "largest gap (s)")
-    return Section("", tables=[Table(facts), Table(rows, columns)])
-
-
-def _write(directory: Path, files: dict[str, bytes], old: list[Path]) -> None:
-    """Write the files and remove old ones; the page comes first, for it marks the directory."""
+def _write(directory: Path, files: dict[str, bytes]) -> None:
+    """Write the files, and remove old pictures; the page comes first: it marks the directory."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             write_whole(directory / name, content)
-        for file in old:
-            if file.name not in files:
+        for file in directory.iterdir():
+            if file.name not in files and _PICTURE.fullmatch(file.name):
                 file.unlink()
     except OSError as error:
         raise RecordingError(f"cannot write the report: {error}") from error

@@ -11,8 +11,8 @@ from actuated_characters.runs.planned.wrenches import PlannedPush, push_schedule
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller
 from msgs_config.messages.clock import TickClock
+from sim_node.physics.balls.throws import ThrowQueue
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowQueue
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 Watch = Callable[[Simulation], object]
@@ -36,7 +36,7 @@ def ticks_in_process(
     """
     controller = controller or make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
-    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulator.integer("rate"))
+    wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulation.rate_hz)
     balls = ThrowQueue()
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))

@@ -30,7 +30,7 @@ _START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be bus
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
 _POLL_PERIOD = 0.05  # s
 _SILENCE = 5.0  # s without a tick, after which the nodes' logs are of interest
-_SIGNS = ("waiting for ", "its type must be ")  # in a node's warning about what does not come
+_SIGNS = ("waiting for ", "its type must be ")  # begin a node's warning about what does not come
 _TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
 
@@ -152,11 +152,11 @@ class _Silence:
     """Prints, once each, what the nodes say that they wait for while no tick comes."""
 
     def __init__(self, children: Sequence[Child]) -> None:
-        self._sizes = dict.fromkeys(children, 0)  # of the logs at the last tick
+        self._sizes = dict.fromkeys(children, 0)  # sizes of the logs at the last tick
         self._ticks, self._since = 0, time.monotonic()
         self._printed: set[str] = set()
 
-    def look(self, ticks: int) -> None:
+    def watch_ticks(self, ticks: int) -> None:
         """Look at the nodes' logs if the number of ticks has been the same for a while."""
         now = time.monotonic()
         if ticks != self._ticks:
@@ -185,7 +185,7 @@ def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> N
             if line.startswith(_TICK):
                 ticks = int(line.removeprefix(_TICK))
         progress(ticks)
-        silence.look(ticks)
+        silence.watch_ticks(ticks)
         if ticks < 2 and time.monotonic() > start_deadline:
             raise RunError(
                 f"no answer within {_START_TIMEOUT:g} s; {simulator.name} says: "

@@ -18,7 +18,7 @@ class HeldSignals:
         self._handlers = {
             number: signal.signal(number, self._receive)
             for number in (signal.SIGINT, signal.SIGTERM)
-            if signal.getsignal(number) is not None  # else it is not Python's, and would be lost
+            if signal.getsignal(number) is not None  # a handler that is not Python's would be lost
         }
 
     def __bool__(self) -> bool:

@@ -23,6 +23,7 @@ from msgs_config.errors import ConfigurationError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from sim_node.node import SimNode
+from sim_node.node_settings import NodeSettings
 
 _PROGRESS_PERIOD = 0.1  # s between words on the progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
@@ -100,8 +101,9 @@ def run_in_process(
         ConfigurationError: the simulator would pause at a fault.
         ActuatedCharactersError: one of the nodes failed, or the simulator rejected an input.
     """
-    for name in ("on_fault", "on_timeout"):
-        if plan.simulator.text(name) == "pause":
+    settings = NodeSettings.of(plan.simulator)
+    for name, action in (("on_fault", settings.on_fault), ("on_timeout", settings.on_timeout)):
+        if action == "pause":
             raise ConfigurationError(
                 f"parameter '{name}' is pause, after which nobody could resume a simulator whose "
                 "services are in this process alone; set it to abort"

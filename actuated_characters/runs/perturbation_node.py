@@ -8,25 +8,28 @@ from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.velocities import read_velocities
 from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
-from msgs_config.bus.node import BusNode, Executor, StopFlag
+from msgs_config.bus.node import BusNode, Executor, StopFlag, declared_settings
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import SESSION, given_session
+from msgs_config.messages.session import GivenSession
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.parameters import Parameter, resolve
+from msgs_config.settings import Settings, parameter
 
-PARAMETERS = [
-    Parameter("file", "pushes.json", "the pushes, as a run writes them"),
-    Parameter("throws", "", "the throws, as a run writes them; empty: none"),
-    Parameter("velocities", "", "the velocities, as a run writes them; empty: none"),
-    Parameter(
-        "wait_for_subscribers", 1, "send when this many subscribe to external_wrench", maximum=1000
-    ),
-    Parameter("throw_subscribers", 1, "likewise to throw", maximum=1000),
-    Parameter("velocity_subscribers", 1, "likewise to cmd_vel_stamped", maximum=1000),
-    SESSION,
-]
+
+class PerturbationSettings(Settings):
+    """What is sent, and to how many."""
+
+    file: str = parameter("pushes.json", "the pushes, as a run writes them")
+    throws: str = parameter("", "the throws, as a run writes them; empty: none")
+    velocities: str = parameter("", "the velocities, as a run writes them; empty: none")
+    wait_for_subscribers: int = parameter(
+        1, "send when this many subscribe to external_wrench", maximum=1000
+    )
+    throw_subscribers: int = parameter(1, "likewise to throw", maximum=1000)
+    velocity_subscribers: int = parameter(1, "likewise to cmd_vel_stamped", maximum=1000)
+    session: GivenSession = GivenSession()
+
 
 _TIMEOUT = 10.0  # s until the simulator has the messages
 
@@ -46,36 +49,35 @@ class PerturbationNode(ComposableNode):
             ActuatedCharactersError: a parameter is wrong, or a file cannot be read.
         """
         super().__init__(node or ros_node("pusher"))
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        session = given_session(values)
-        pushes = read_pushes(Path(values.text("file")))
+        settings = declared_settings(self.node, PerturbationSettings)
+        session = settings.session.id
+        pushes = read_pushes(Path(settings.file))
         self._outgoing = [
             _PlannedPublisher(
                 self.node,
                 topics.EXTERNAL_WRENCH,
                 [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
-                values.integer("wait_for_subscribers"),
+                settings.wait_for_subscribers,
             )
         ]
-        if values.text("throws"):
-            throws, codec = read_throws(Path(values.text("throws"))), ThrowCodec(session)
+        if settings.throws:
+            throws, codec = read_throws(Path(settings.throws)), ThrowCodec(session)
             self._outgoing.append(
                 _PlannedPublisher(
                     self.node,
                     topics.THROW,
                     [codec.encode(each.stamp_ns, each.throw) for each in throws],
-                    values.integer("throw_subscribers"),
+                    settings.throw_subscribers,
                 )
             )
-        if values.text("velocities"):
-            velocities = read_velocities(Path(values.text("velocities")))
+        if settings.velocities:
+            velocities = read_velocities(Path(settings.velocities))
             self._outgoing.append(
                 _PlannedPublisher(
                     self.node,
                     topics.CMD_VEL_STAMPED,
                     [each.encode() for each in velocities],
-                    values.integer("velocity_subscribers"),
+                    settings.velocity_subscribers,
                 )
             )
 

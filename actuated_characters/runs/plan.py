@@ -5,12 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
-from controller_node.behaviours.factory import choose_behaviour, make_motion
-from controller_node.behaviours.state_machine.factory import STATE_MACHINE
+from controller_node.behaviours.factory import BehaviourSettings, choose_behaviour, make_motion
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_installed, check_planning
-from controller_node.planner.settings import PREDICTIVE
+from controller_node.planner.settings import PREDICTIVE, PlannerParameters
 from controller_node.references.base import Motion, Reference
+from controller_node.references.clip import ClipSettings
+from controller_node.references.factory import MotionSettings
+from controller_node.references.keyframes import KeyframesSettings
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
@@ -19,20 +22,25 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
 from msgs_config.parameters import Values
 from msgs_config.plain_values import as_plain, plain_parameters
-from msgs_config.shared_parameters import collides, placed
+from msgs_config.shared_parameters import KEYFRAME, KEYFRAME_PERIOD, collides, placed
 from sim_node import parameters as simulator_parameters
-from sim_node.initial_state import INITIAL_STATE, as_values, describe_start
+from sim_node.initial_state import INITIAL_STATE, CharacterSettings, as_values, describe_start
+from sim_node.node_settings import NodeSettings
 from sim_node.physics.probe import measure_probe
+from sim_node.physics.settings import STEADY_CONTACTS, SimulationSettings
 from sim_node.physics.short_links import describe_speed_bound
-from sim_node.world_parameters import STEADY_CONTACTS
 
-SHARED = ("rate", "gravity", "placement", "collision", "command_delay_ticks")
+SHARED = (
+    *("rate", "gravity", "placement", "collision", "command_delay_ticks"),
+    KEYFRAME_PERIOD.name,
+)
 """The same on both sides; set on one, they count on both."""
 _LARGEST_DURATION = 1e9  # s
 _SET_BY_RUN = {
     "character": "--character, for both nodes",
     "characters": "no run, which has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
+    KEYFRAME.name: "`fork`, whose run goes on from there",
     "max_ticks": "--duration",
     "session": "the run itself, which makes one for all its nodes",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
@@ -50,12 +58,27 @@ class RunPlan:
     reference: Reference
     simulator: Values
     controller: Values
-    warnings: tuple[str, ...]  # that the user should read
+    warnings: tuple[str, ...]  # the user should read them
 
     @property
     def ticks(self) -> int:
         """Length of the run in ticks."""
-        return self.simulator.integer("max_ticks")
+        return NodeSettings.of(self.simulator).max_ticks
+
+    @property
+    def motion_name(self) -> str:
+        """The name of the motion that is tracked."""
+        if BehaviourSettings.of(self.controller).behaviour == STATE_MACHINE:
+            return MachineSettings.of(self.controller).machine
+        kind = MotionSettings.of(self.controller).reference
+        if kind == "keyframes":
+            return KeyframesSettings.of(self.controller).keyframes
+        return ClipSettings.of(self.controller).clip if kind == "clip" else kind
+
+    @property
+    def simulation(self) -> SimulationSettings:
+        """What the simulation is set to."""
+        return SimulationSettings.of(self.simulator)
 
 
 def make_plan(
@@ -93,14 +116,16 @@ def make_plan(
     check_installed(controller)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
-    if controller.text("planner") == PREDICTIVE or controller.text("behaviour") == STATE_MACHINE:
+    planner = PlannerParameters.of(controller).planner
+    if planner == PREDICTIVE or BehaviourSettings.of(controller).behaviour == STATE_MACHINE:
         defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
-    _check_engines(character, simulator.number("gravity"))
+    settings = SimulationSettings.of(simulator)
+    _check_engines(character, settings.world.gravity)
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings
-    warnings += describe_start(character, simulator) + describe_speed_bound(character, simulator)
+    warnings += describe_start(character, simulator) + describe_speed_bound(character, settings)
     return RunPlan(character, motion.reference, simulator, controller, warnings)
 
 
@@ -148,8 +173,8 @@ def _controller_values(character: Character, given: Mapping[str, object]) -> tup
 
 def _simulator_values(character: Character, given: Mapping[str, object], duration: float) -> Values:
     values = simulator_parameters.resolve_alone(character, {**RUN_DEFAULTS, **given})
-    values["max_ticks"] = count_ticks(duration, values.integer("rate"))
-    character.check_driven(values.texts("commanded_joints"))
+    values["max_ticks"] = count_ticks(duration, SimulationSettings.of(values).rate_hz)
+    character.check_driven(CharacterSettings.of(values).commanded_joints)
     return values
 
 
@@ -187,7 +212,7 @@ def _keep_assistance_in_step(
 
 def _check_commanded(simulator: Values, commanded: list[str]) -> None:
     """Both sides must mean the same joints, or the simulator would wait forever."""
-    required = set(simulator.texts("commanded_joints"))
+    required = set(CharacterSettings.of(simulator).commanded_joints)
     if required != set(commanded):
         raise ConfigurationError(
             f"sim_node's commanded_joints are {_listed(required)}; controller_node commands "

@@ -30,7 +30,7 @@ MODULES = {
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
 _LAST_LINES = 3  # are told of a process that failed without saying why
 _PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent, not for a reader
-_WARNED = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # of rcutils
+_WARNING_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # rcutils' form
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
 
@@ -128,7 +128,7 @@ class Child:
     def last_warning(self, since: int) -> str:
         """The text of the node's last warning beyond so many bytes of the log; empty: none."""
         later = self._log.read_bytes()[since:].decode(errors="replace")
-        found = [match[1] for line in _filled_lines(later) if (match := _WARNED.match(line))]
+        found = [match[1] for line in _filled_lines(later) if (match := _WARNING_LINE.match(line))]
         return found[-1] if found else ""
 
     def send(self, number: signal.Signals) -> None:

@@ -25,7 +25,7 @@ class Scene:
 
     name: str
     title: str  # what there is to see, in one line
-    nodes: Mapping[str, Parameters]  # by name below the simulator's namespace; the simulator first
+    nodes: Mapping[str, Parameters]  # the simulator's first, by names below its namespace
 
     @property
     def simulator(self) -> Parameters:

@@ -92,7 +92,7 @@ class CharacterReader:
                 return False
             sample.state = state_in_layout(self._layout, self._state_decoder.decode(raw))
         except _UNUSABLE_MESSAGE:
-            return False  # a message of a node that is not ours; nodes that use it say so
+            return False  # it is malformed, which the nodes that use it say
         return True
 
     def close(self) -> None:

@@ -8,12 +8,12 @@ from rclpy.node import Node
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.hands import Hands
-from actuated_characters.viewer.controls.panel import Panel, Subject
-from actuated_characters.viewer.controls.shown_parameters import Shown, shown_parameters
+from actuated_characters.viewer.controls.panel import ControlPanel, Subject
+from actuated_characters.viewer.controls.shown_parameters import ShownParameter, shown_parameters
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.parameters import PARAMETERS
-from actuated_characters.viewer.simulators import Simulators, Watched
+from actuated_characters.viewer.parameters import PARAMETERS, ViewerSettings
+from actuated_characters.viewer.simulators import WatchedNamespace, WatchedSimulators
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
 from actuated_characters.viewer.web.server import (
@@ -49,19 +49,20 @@ class ViewerNode(Node):
         super().__init__(topics.VIEWER_NODE, **options)
         values = resolve(PARAMETERS, given_parameters(self))
         declare(self, PARAMETERS, values)
-        self._period = 1.0 / values.number("fps")
+        settings = ViewerSettings.of(values)
+        self._period = 1.0 / settings.fps
         self._once_logger = OnceLogger(self.get_logger())
-        host = values.text("host")
+        host = settings.host
         self._rejections = Rejections()
-        listening = open_socket(host, values.integer("port") or None)
+        listening = open_socket(host, settings.port or None)
         self._server = start_server(listening, RequestCheck(host), self._rejections.note)
         self._scene = BrowserScene(self._server)
         self._actions = ActionQueue()
         self._hands = Hands(self, self._scene, self._actions)
-        self._panel = Panel(self, self._server.gui, self._scene, self._hands, self._actions)
-        self._simulators = Simulators(self, self.get_namespace().rstrip("/"), self._log)
+        self._panel = ControlPanel(self, self._server.gui, self._scene, self._hands, self._actions)
+        self._simulators = WatchedSimulators(self, self.get_namespace().rstrip("/"), self._log)
         self._drawn: dict[str, LiveCharacter] = {}
-        self._parameters: dict[str, Mapping[str, tuple[Shown, ...]]] = {}
+        self._parameters: dict[str, Mapping[str, tuple[ShownParameter, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
         self._announce(host, listening.getsockname()[1])
 
@@ -94,7 +95,7 @@ class ViewerNode(Node):
             executor.close()
 
     def _search(self) -> None:
-        self._simulators.look()
+        self._simulators.find_simulators()
         for watched in self._simulators.gone():
             self._remove(watched.below)
         for sentence in self._rejections.take():
@@ -120,7 +121,7 @@ class ViewerNode(Node):
             self._hands.pull(self._drawn, self._stamps_ns())
             self._scene.follow_characters(list(self._drawn.values()), seconds)
 
-    def _draw(self, watched: Watched) -> None:
+    def _draw(self, watched: WatchedNamespace) -> None:
         if watched.is_new_episode and watched.simulator in self._balls:
             self._balls[watched.simulator].remove()
         drawn = self._drawn.get(watched.below)
@@ -153,7 +154,7 @@ class ViewerNode(Node):
         }
         return {below: state.stamp_ns for below, state in states.items() if state is not None}
 
-    def _rebuild(self, watched: Watched) -> None:
+    def _rebuild(self, watched: WatchedNamespace) -> None:
         """Draw a character as it is described now; one that a restart left as it was stays."""
         rebuilt, before = watched.rebuilt, self._drawn.get(watched.below)
         assert rebuilt is not None

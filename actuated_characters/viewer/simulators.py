@@ -18,7 +18,7 @@ _CONFIGURATION = "/" + topics.CONFIGURATION.of(topics.SIM_NODE).name
 
 
 @dataclass
-class Watched:
+class WatchedNamespace:
     """A namespace in which a simulator has published the description of a character."""
 
     below: str  # its name, which begins with `/` or is empty
@@ -44,16 +44,16 @@ class Watched:
         return f"/{inner}" if inner else ""
 
 
-class Simulators:
+class WatchedSimulators:
     """All characters of all simulators in a namespace, and the newest that is known of them."""
 
     def __init__(self, node: Node, namespace: str, log: Callable[[str], None]) -> None:
         """Look below a namespace, which is empty or begins with `/`; `log` gets warnings."""
         self._node, self._namespace, self._log = node, namespace, log
-        self._watched: dict[str, Watched] = {}
+        self._watched: dict[str, WatchedNamespace] = {}
         self._balls: dict[str, tuple[str, BallReader]] = {}  # by the simulator's namespace
 
-    def look(self) -> None:
+    def find_simulators(self) -> None:
         """Subscribe to the descriptions that simulators publish; cheap, but not for each frame."""
         for name, _ in self._node.get_topic_names_and_types():
             below = name.removesuffix(_CONFIGURATION)
@@ -62,13 +62,13 @@ class Simulators:
             if below not in self._watched and self._node.count_publishers(name):
                 configuration = replace(topics.CONFIGURATION, name=name)
                 episode = replace(topics.EPISODE, name=f"{below}/{topics.EPISODE.name}")
-                self._watched[below] = Watched(
+                self._watched[below] = WatchedNamespace(
                     below,
                     DirectSubscription(self._node, configuration),
                     DirectSubscription(self._node, episode),
                 )
 
-    def changed(self) -> Iterator[Watched]:
+    def changed(self) -> Iterator[WatchedNamespace]:
         """The characters of which a new description has come since the last call."""
         for watched in list(self._watched.values()):
             self._take_episodes(watched)
@@ -86,14 +86,14 @@ class Simulators:
             yield watched
 
     @staticmethod
-    def _take_episodes(watched: Watched) -> None:
+    def _take_episodes(watched: WatchedNamespace) -> None:
         before = watched.episode_text
         with suppress(MessageError):
             while (raw := watched.episode.take()) is not None:
                 watched.episode_text = decode_header(raw)[1]
         watched.is_new_episode = watched.episode_text != before
 
-    def gone(self) -> list[Watched]:
+    def gone(self) -> list[WatchedNamespace]:
         """Forget the characters without a publisher, if there are others; returns them."""
         silent = [
             each
@@ -141,13 +141,13 @@ class Simulators:
                 self._balls[simulator] = session, BallReader(self._node, simulator, session)
 
     @staticmethod
-    def _close(watched: Watched) -> None:
+    def _close(watched: WatchedNamespace) -> None:
         if watched.reader is not None:
             watched.reader.close()
             watched.reader = None
 
     @property
-    def characters(self) -> list[Watched]:
+    def characters(self) -> list[WatchedNamespace]:
         """All characters that are known."""
         return [each for each in self._watched.values() if each.rebuilt is not None]
 

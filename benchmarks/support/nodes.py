@@ -46,13 +46,30 @@ class Nodes:
             self._simulator = child
         return child
 
-    def start_composed(
-        self, simulator: Mapping[str, object], controller: Mapping[str, object]
-    ) -> Child:
-        """Start the simulator and a controller in one process."""
-        parameters = {topics.SIM_NODE: simulator, topics.CONTROLLER_NODE: controller}
-        self._simulator = self._children.start_composed("composed", parameters)
-        return self._simulator
+    def start_loop(
+        self,
+        simulator: Mapping[str, object],
+        controller: Mapping[str, object],
+        *,
+        composed: bool = False,
+    ) -> None:
+        """Start the simulator and a controller, in a process each, or in one if `composed`.
+
+        The simulator's reports are heard before its first tick, or as it waits for subscribers.
+        """
+        if composed:
+            parameters = {topics.SIM_NODE: simulator, topics.CONTROLLER_NODE: controller}
+            self._simulator = self._children.start_composed("composed", parameters)
+            return
+        self.start(topics.SIM_NODE, simulator)
+        if not simulator.get("wait_for_subscribers"):
+            self.wait_until(lambda: self.reports)
+        self.start(topics.CONTROLLER_NODE, controller)
+
+    @property
+    def tick(self) -> int:
+        """The tick of the simulator's last report; 0 before the first."""
+        return int(self.reports[-1]["tick"]) if self.reports else 0
 
     def wait_until(
         self,

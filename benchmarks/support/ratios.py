@@ -13,6 +13,7 @@ from pathlib import Path
 import yaml
 from rich.table import Table
 
+from benchmarks.support.printed import make_table
 from msgs_config.errors import ConfigurationError
 
 RATIOS_FILE = Path(__file__).with_name("ratios.yaml")
@@ -29,7 +30,7 @@ class Ratio:
 
     figure: str
     value: float
-    how: str  # which cost over which
+    how: str  # says which cost is over which
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,8 @@ def compare(measured: Iterable[Ratio], stored: Mapping[str, float]) -> list[Rati
 
 def comparison_table(comparisons: Iterable[RatioComparison]) -> Table:
     """A row for each ratio; red where it got worse."""
-    table = Table(title="ratios, beside the stored ones; less is better", title_justify="left")
-    table.add_column("")
-    for column in ("now", "stored", "change"):
-        table.add_column(column, justify="right")
+    title = "ratios, beside the stored ones; less is better"
+    table = make_table(title, ("", "now", "stored", "change"))
     for each in comparisons:
         stored = "none" if each.stored is None else f"{each.stored:.3g}"
         change = "" if each.change is None else f"{100.0 * each.change:+.0f} %"

@@ -10,7 +10,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_LOCKED = 1e-5  # cos b below which a is free; to hold it then errs by less than that, rad
+# Below this cos b the angle a is free; to hold it then errs by less than that, rad.
+_GIMBAL_LOCK_COSINE = 1e-5
 _FULL = 2.0 * np.pi
 
 
@@ -32,7 +33,7 @@ def euler_angles(turns_xyzw: FloatArray, order: str) -> FloatArray:
     result = np.empty((*cosine.shape, 3))
     before = np.zeros((*cosine.shape[1:], 3))
     for frame, matrix in enumerate(axes):
-        a = np.where(cosine[frame] < _LOCKED, before[..., 0], first[frame])
+        a = np.where(cosine[frame] < _GIMBAL_LOCK_COSINE, before[..., 0], first[frame])
         # R_j(b) R_k(c), which is what remains of the turn when a is taken off it
         sine_a, cosine_a = np.sin(a), np.cos(a)
         across = cosine_a * matrix[..., j, i] + sign * sine_a * matrix[..., k, i]

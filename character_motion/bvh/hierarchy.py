@@ -34,7 +34,7 @@ def parse_number(text: str) -> float:
 
 
 @dataclass
-class _Joint:
+class _JointLines:
     """A joint, or an end site, which has no name, while it is read."""
 
     name: str
@@ -49,7 +49,7 @@ class HierarchyParser:
     """Takes the statements of a hierarchy, one after the other."""
 
     path: Path
-    _nodes: list[_Joint] = field(default_factory=list)
+    _nodes: list[_JointLines] = field(default_factory=list)
     _open: list[int] = field(default_factory=list)  # nodes whose braces are open, the last inside
     _has_begun: bool = False
     _awaits_brace: bool = False
@@ -122,7 +122,7 @@ class HierarchyParser:
         if len(self._nodes) == _MOST_JOINTS:
             raise wrong_line(self.path, number, statement, f"at most {_MOST_JOINTS} joints")
         self._open.append(len(self._nodes))
-        self._nodes.append(_Joint(name, parent, number))
+        self._nodes.append(_JointLines(name, parent, number))
         self._awaits_brace = True
 
     def _end(self, number: int) -> None:

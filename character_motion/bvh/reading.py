@@ -16,8 +16,8 @@ from character_motion.bvh.hierarchy import (
 from character_motion.bvh.skeleton import BvhMotion
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClipError
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.files import read_text
-from msgs_config.motion_formats import describe_foreign_motion
 
 MAX_BYTES = 64 * 1024 * 1024
 """Of a file: ten minutes of a body with fingers at 120 Hz."""
@@ -59,11 +59,7 @@ def read_bvh(path: Path) -> BvhMotion:
 
 def _text(path: Path) -> str:
     """The text of a file, in UTF-8 or in UTF-16 with its mark, or else byte by byte."""
-    foreign = describe_foreign_motion(path)
-    if foreign:
-        raise ClipError(f"{path}: not a BVH file but {foreign}")
-    if path.suffix.lower() == ".json":
-        raise ClipError(f"{path}: not a BVH file; a clip needs no import, 'run --clip' plays it")
+    refuse_other_kind(path, "a BVH file", (".bvh",), ClipError)
     try:
         return read_text(path, ClipError, MAX_BYTES).removeprefix("\ufeff")
     except ClipError as error:
@@ -99,7 +95,7 @@ def _values(path: Path, rows: Sequence[tuple[int, str]], width: int) -> FloatArr
             values[frame] = words
         except ValueError:
             values[frame] = [parse_number(word) for word in words]
-        if not (np.abs(values[frame]) <= LARGEST).all():  # NaN is refused, too
+        if not (np.abs(values[frame]) <= LARGEST).all():  # this refuses NaN as well
             bad = words[int(np.argmin(np.abs(values[frame]) <= LARGEST))]
             raise wrong_line(path, number, bad, f"finite numbers up to {LARGEST:g}, as all are")
     return values

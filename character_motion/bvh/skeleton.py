@@ -27,10 +27,10 @@ class Skeleton:
     in their order: `R = R_first R_second R_third`, from the joint's frame into its parent's.
     """
 
-    names: tuple[str, ...]  # of the j joints; the first is the root
+    names: tuple[str, ...]  # names of the j joints; the first is the root's
     parents: tuple[int, ...]  # index of each joint's parent; -1 of the root
     offsets: FloatArray  # (j, 3) of each joint in its parent's frame, file units
-    channels: tuple[tuple[str, ...], ...]  # of each joint, in the file's order, from `CHANNELS`
+    channels: tuple[tuple[str, ...], ...]  # each joint's, from `CHANNELS`, in the file's order
     end_sites: tuple[EndSite, ...]
 
     @property

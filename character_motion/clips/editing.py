@@ -12,7 +12,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.errors import ClipError
 from msgs_config.geometry import fixed_order, rotations
 
-_SHORTEST = 0.2  # s that a cycle lasts at least
+_MIN_CYCLE = 0.2  # s that a cycle lasts at least
 _COMPARED_SECONDS = 0.1  # s over which two moments are compared
 _SPEEDS = (0.05, 20.0)
 _EPSILON = 1e-9  # s
@@ -133,7 +133,7 @@ def mirror(clip: MotionClip) -> MotionClip:
 
 def _check_times(clip: MotionClip, start: float | None, end: float | None) -> None:
     """Raise ClipError if a time in s is not within a clip."""
-    latest = clip.duration + 0.5 / clip.rate  # so a duration that was rounded for display will do
+    latest = clip.duration + 0.5 / clip.rate  # a duration that was rounded for display will do
     for time in (start, end):
         if time is not None and not -_EPSILON <= time <= latest:
             goes_on = ", and begins again there" if clip.wraps else ""
@@ -173,7 +173,7 @@ def _cycle(clip: MotionClip, start: float | None, end: float | None) -> tuple[in
     rows = np.arange(len(clip.times))
     firsts = rows if start is None else rows[[int(np.argmin(np.abs(clip.times - start)))]]
     lasts = rows if end is None else rows[[int(np.argmin(np.abs(clip.times - end)))]]
-    least = _SHORTEST if start is not None else max(_SHORTEST, clip.duration / 3.0)
+    least = _MIN_CYCLE if start is not None else max(_MIN_CYCLE, clip.duration / 3.0)
     features = _features(clip)
     best, found = np.inf, None
     for first in firsts.tolist():

@@ -17,7 +17,7 @@ from character_motion.clips.quality import (
     link_poses,
     measure_quality,
 )
-from character_motion.retargeting.inverse_kinematics import Progress
+from character_motion.retargeting.optimisation.inverse_kinematics import Progress
 from character_motion.retargeting.retargeting import (
     RetargetedMotion,
     RetargetingSettings,
@@ -41,7 +41,7 @@ class ImportedClip:
     worst_joint: str  # a role, such as `left_elbow`
     worst_mean_rad: float  # mean angle between the segment and the captured one
     worst_max_rad: float
-    remarks: tuple[str, ...]  # on the capture and on the clip, a sentence each
+    remarks: tuple[str, ...]  # a sentence each on the capture and on the clip
 
 
 def import_bvh(

@@ -15,7 +15,7 @@ from msgs_config.errors import ClipError
 from msgs_config.geometry import rotations
 
 _WORDS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l_", "r_"), ("_l", "_r"))
-_MAX_MIRROR_ERROR = 0.01  # m for places; for axes, what their cosine may lack to one
+_MAX_MIRROR_ERROR = 0.01  # m of places; what the cosine of axes may lack to one
 
 
 def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
@@ -38,7 +38,7 @@ def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
         if joint.rotation is not None:
             k, source = index[joint.rotation.start], index[other.rotation.start]  # type: ignore[union-attr]
             own = rotations.log(clip.motion.orientations_xyzw[:, source])
-            in_world = rotations.rotate(turns[image], own)  # an axial vector
+            in_world = rotations.rotate(turns[image], own)  # own is an axial vector
             mirrored = in_world * np.array((-1.0, 1.0, -1.0))
             back = rotations.rotate(rotations.conjugate(turns[row]), mirrored)
             result[:, k] = rotations.exp(back)

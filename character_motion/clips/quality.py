@@ -18,7 +18,7 @@ _AT_LIMIT = 0.03  # rad from a limit
 _SHORTEST_SWING = 0.2  # s
 _BLOCK = 256  # frames that are measured at once
 _OVERLAPS, _IN_GROUND, _CLEARANCE = 0.005, 0.01, 0.01  # m beyond which there is a remark
-_SKATING, _STANDING = 0.05, 0.05  # m/s, and share of the frames, for a remark
+_REMARKED_SKATING, _MIN_SHARE = 0.05, 0.05  # m/s, and share of the frames, for a remark
 _DIGITS = 4
 
 
@@ -29,14 +29,14 @@ class ClipQuality:
     feet_in_ground_m: float  # the deepest point of a sole
     deepest_m: float  # the deepest point of any link
     deepest_link: str
-    skating_mean_m_s: float | None  # of the parts of soles that stand; None if none does
+    skating_mean_m_s: float | None  # speed of the parts of soles that stand; None if none does
     skating_p95_m_s: float | None
     standing_share: float  # share of the time in which a foot stands
-    swing_clearance_m: float | None  # the least of all swings, in their middle; None without one
+    swing_clearance_m: float | None  # least height in the middle of a swing; None without one
     overlap_m: float  # how deep two shapes are in each other at the most
     overlap_pair: str
     overlap_share: float  # share of the frames with an overlap that deserves a remark
-    limits_touched: dict[str, float]  # by degree of freedom, the share of frames at a limit
+    limits_touched: dict[str, float]  # share of frames at a limit by degree of freedom
     fastest_joint: str
     fastest_joint_rad_s: float
 
@@ -148,7 +148,7 @@ def describe_shortcomings(quality: Mapping[str, Any]) -> list[str]:
     bounds = (
         ("overlap_m", _OVERLAPS, "shapes overlap by up to {:.1f} mm", 1e3),
         ("feet_in_ground_m", _IN_GROUND, "soles are in the ground by up to {:.1f} mm", 1e3),
-        ("skating_mean_m_s", _SKATING, "standing feet skate at {:.1f} cm/s", 1e2),
+        ("skating_mean_m_s", _REMARKED_SKATING, "standing feet skate at {:.1f} cm/s", 1e2),
     )
     remarks = []
     for name, bound, text, factor in bounds:
@@ -162,9 +162,9 @@ def describe_shortcomings(quality: Mapping[str, Any]) -> list[str]:
             f"{1e3 * _CLEARANCE:g}: it will scuff where the body hangs lower"
         )
     share = quality.get("standing_share")
-    if share is not None and share < _STANDING:
+    if share is not None and share < _MIN_SHARE:
         remarks.append(
-            f"a foot stands in {100 * share:.0f} % of the frames, fewer than {100 * _STANDING:g} %"
+            f"a foot stands in {100 * share:.0f} % of the frames, fewer than {100 * _MIN_SHARE:g} %"
         )
     return remarks
 

@@ -50,8 +50,8 @@ class _Joints:
 
     def __init__(self, character: Character) -> None:
         self._character, links = character, character.links
-        joint_of: list[int] = []  # for each link, the joint that it hangs on
-        self._links: list[int] = []  # for each joint, the row of its link
+        joint_of: list[int] = []  # the joint that each link hangs on
+        self._links: list[int] = []  # the row of each joint's link
         self._parents: list[int] = []
         for row, link in enumerate(links):
             if row == 0 or link.joint.type is not JointType.FIXED:

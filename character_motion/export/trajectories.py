@@ -25,7 +25,7 @@ Progress = Callable[[int], None]
 class CharacterTrajectory:
     """The positions of one character at t times; rotations are in the quaternions alone."""
 
-    name: str  # its name in its world; the character's own where it has none there
+    name: str  # name in its world, or the character's own
     character: Character
     configurations: GeneralizedPosition  # (t, n) message form, (t, k, 4)
 
@@ -92,15 +92,15 @@ class Trajectories:
         model, still = DynamicsModel(character), np.zeros(character.layout.size)
         origins = np.empty((len(times), len(character.links), 3))
         turns_xyzw = np.empty((len(times), len(character.links), 4))
-        for frame, position in enumerate(self._positions(trajectory, times)):
+        for frame, position in enumerate(self.positions(trajectory, times)):
             model.update(position, still)
             origins[frame], turns_xyzw[frame] = model.link_poses()
             if progress is not None:
                 progress(frame + 1)
         return LinkPoses(origins, turns_xyzw)
 
-    def _positions(self, trajectory: CharacterTrajectory, times: FloatArray) -> FloatArray:
-        """Positions (f, n), message form; between two times along the shortest turns."""
+    def positions(self, trajectory: CharacterTrajectory, times: FloatArray) -> FloatArray:
+        """Positions (f, n), message form, at times (f,) in s; between two by the shortest turns."""
         layout, known = trajectory.character.layout, trajectory.configurations
         rows, shares = self._rows(times)
         after = np.minimum(rows + 1, len(self.times) - 1)

@@ -10,7 +10,7 @@ from character_motion.retargeting.skeleton_map import SIDES, SkeletonMap, ancest
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
-_SHORTEST = 0.02  # share of a leg's length; a shorter bone has no direction
+_MIN_BONE_LENGTH = 0.02  # share of a leg's length; a shorter bone has no direction
 _BEGINS_NEAR = 0.3  # share of the way from hips to neck that the spine's middle may be off
 
 
@@ -51,7 +51,7 @@ class CapturedBody:
         """The node below a joint that is farthest from it: its child, or end site; None if near."""
         below = [node for node, parent in enumerate(self.parents) if parent == self.map[role]]
         lengths = [float(np.linalg.norm(self.rest[n] - self.rest[self.map[role]])) for n in below]
-        if not below or max(lengths) < _SHORTEST * self.leg_length:
+        if not below or max(lengths) < _MIN_BONE_LENGTH * self.leg_length:
             return None
         return below[int(np.argmax(lengths))]
 

@@ -9,7 +9,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 
 _ENTER, _LEAVE = ((0.022, 0.20), (0.05, 0.10)), ((0.035, 0.40), (0.06, 0.15))
 """Heights in m below which, and speeds in m/s below which a point touches; either pair will do."""
-_SMOOTHED = 0.05  # s over which a speed is measured
+_SMOOTHING_TIME = 0.05  # s over which a speed is measured
 _MIN_CONTACT, _MAX_GAP = 0.06, 0.05  # s of a contact, and of a break that is none
 _STILL_DISTANCE = 0.05  # m, the farthest that a point may be from its mean place during a contact
 _SMOOTHED_PLACES = 0.08  # s over which places are averaged, so that noise goes
@@ -36,7 +36,7 @@ def ground_height(heights: FloatArray) -> float:
 
 def speeds(positions: FloatArray, frame_time: float) -> FloatArray:
     """Speed (f,) in m/s of points (f, 3), over a few hundredths of a second."""
-    reach = max(1, round(0.5 * _SMOOTHED / frame_time))
+    reach = max(1, round(0.5 * _SMOOTHING_TIME / frame_time))
     rows = np.arange(len(positions))
     after, before = np.minimum(rows + reach, len(rows) - 1), np.maximum(rows - reach, 0)
     lasting = np.maximum(after - before, 1) * frame_time

@@ -17,10 +17,10 @@ from msgs_config.geometry import rotations
 
 _LEG = 0.82  # m from the hip to the ankle of an adult
 _USUAL_UNITS = ("m", "cm", "mm", "inches", "feet")
-_NEAREST = 0.35  # difference of natural logarithms: a leg of 0.58 m to 1.16 m
+_SCALE_TOLERANCE = 0.35  # difference of natural logarithms: a leg of 0.58 m to 1.16 m
 _PRIOR = {"y": 0.10, "z": 0.05, "x": -0.05, "-x": -0.3, "-y": -0.2, "-z": -0.2}
-_UPRIGHT = math.cos(math.radians(38.0))  # least cosine of the tilt of legs and trunk at rest
-_JUMP = 0.12  # in lengths of a leg, how far joints move from a pose that was put first
+_UPRIGHT_COSINE = math.cos(math.radians(38.0))  # least cosine of the tilt of legs and trunk at rest
+_JUMP = 0.12  # lengths of a leg that joints move from a pose that was put first
 _MORE_THAN_ELSE = 6.0  # times as far as joints move between other frames
 _FACING_TIME = 0.1  # s over which a body's first heading is measured
 
@@ -184,7 +184,7 @@ def rest_up(body: CapturedBody) -> FloatArray | None:
     for side in SIDES:
         points = [rest[named[f"{side}_{part}"]] for part in ("ankle", "knee", "hip")]
         bones += [points[1] - points[0], points[2] - points[1]]
-    return up if all(float(_unit(bone) @ up) > _UPRIGHT for bone in bones) else None
+    return up if all(float(_unit(bone) @ up) > _UPRIGHT_COSINE for bone in bones) else None
 
 
 def rest_name(body: CapturedBody) -> str:
@@ -208,7 +208,7 @@ def find_unit(leg: float) -> tuple[str, float]:
     """
     apart = {unit: abs(math.log(leg * UNITS[unit] / _LEG)) for unit in _USUAL_UNITS}
     nearest = min(apart, key=lambda unit: apart[unit])
-    return (nearest, UNITS[nearest]) if apart[nearest] < _NEAREST else ("?", _LEG / leg)
+    return (nearest, UNITS[nearest]) if apart[nearest] < _SCALE_TOLERANCE else ("?", _LEG / leg)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ LEFT, RIGHT = "left", "right"
 
 _WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _SIDES = {"left": LEFT, "l": LEFT, "lft": LEFT, "right": RIGHT, "r": RIGHT, "rgt": RIGHT}
-_NAMELESS = re.compile(  # words that say whose joint it is, or that it is one
+_WORDS_WITHOUT_ROLE = re.compile(  # words that say whose joint it is, or that it is one
     r"(mixamorig|bip|character|skeleton|skel|rig|armature|def|jnt|jt|j|b|bone|cc|base|bend|c|ctrl)\d*"
 )
 _SIDE_AND_WORD = re.compile(r"([lr])([uf])")  # such as `LUArm`, the left upper arm
@@ -90,7 +90,7 @@ def side_and_part(name: str, *, of_robot: bool = False) -> tuple[str, str]:
         return "", ""
     if len(words) > 1 and words[0] == "joint":
         words = words[1:]
-    words = [word for word in words if not (word.isdigit() or _NAMELESS.fullmatch(word))]
+    words = [word for word in words if not (word.isdigit() or _WORDS_WITHOUT_ROLE.fullmatch(word))]
     sides = [_SIDES[word] for word in words if word in _SIDES]
     rest = "".join(word for word in words if word not in _SIDES)
     if sides:

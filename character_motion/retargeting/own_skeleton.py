@@ -1,4 +1,4 @@
-"""BVH files of a character's own skeleton, such as `motion export` writes: taken as they are."""
+"""BVH files of a character's own skeleton, such as `export` writes: taken as they are."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from character_motion.bvh.skeleton import BvhMotion
 from character_motion.export.bvh_motion import to_bvh
 from character_motion.export.trajectories import LinkPoses
 from character_motion.export.upright import UPRIGHT_XYZW
-from character_motion.retargeting.joint_angles import joint_angles
+from character_motion.retargeting.optimisation.joint_angles import joint_angles
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.geometry import rotations

@@ -23,8 +23,9 @@ _SHARES = {  # shares of a leg's length from hip to ankle
 _MOST_DOUBTS = 1  # doubts that a human body may give rise to
 _ANIMAL = re.compile(r"(?<!pony)(?<!coat)tail|paw(?!n)|hoof|wing|snout|hind|fetlock", re.IGNORECASE)
 _LIES = 0.5  # cosine of the trunk's angle to the vertical, below which it lies
-_MOSTLY = 0.8  # share of the frames
-_FLIGHT, _SMOOTHED = 1.0, 0.2  # s that a jump lasts at most, and over which the ground is smoothed
+_SHARE_OF_FRAMES = 0.8  # share of the frames
+_MAX_FLIGHT = 1.0  # s that a jump lasts
+_SMOOTHING_TIME = 0.2  # s over which the ground is smoothed
 _FLOATS = 0.05  # m over the ground
 
 
@@ -43,7 +44,7 @@ def doubts_of_human(body: CapturedBody) -> tuple[str, ...]:
     trunk = body.neck_base() - body.middle("hip")
     upright = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=-1), 1e-9)
     lies = float((upright < _LIES).mean())
-    if lies > _MOSTLY and rest_up(body) is None:
+    if lies > _SHARE_OF_FRAMES and rest_up(body) is None:
         unusual.append(f"the trunk lies in {100 * lies:.0f} % of the frames, at rest as well")
     if animal or len(unusual) > _MOST_DOUBTS:
         found += unusual
@@ -78,9 +79,9 @@ def ground_drift(body: CapturedBody) -> FloatArray:
         if f"{side}_{part}" in body.map
     ]
     lowest = np.min(feet, axis=0)
-    half_flight = max(1, round(0.5 * _FLIGHT / body.frame_time))
+    half_flight = max(1, round(0.5 * _MAX_FLIGHT / body.frame_time))
     opened = _over(_over(lowest, half_flight).min(axis=-1), half_flight).max(axis=-1)
-    smoothed = _over(opened, max(1, round(0.5 * _SMOOTHED / body.frame_time))).mean(axis=-1)
+    smoothed = _over(opened, max(1, round(0.5 * _SMOOTHING_TIME / body.frame_time))).mean(axis=-1)
     drift: FloatArray = smoothed - ground_height(lowest)
     return drift
 

@@ -25,8 +25,8 @@ from character_motion.retargeting.conventions import (
     rest_name,
     to_upright,
 )
-from character_motion.retargeting.goals import first_guess, free_goals
-from character_motion.retargeting.inverse_kinematics import InverseKinematics, Progress
+from character_motion.retargeting.optimisation.goals import first_guess, free_goals
+from character_motion.retargeting.optimisation.inverse_kinematics import InverseKinematics, Progress
 from character_motion.retargeting.own_skeleton import own_motion
 from character_motion.retargeting.plausibility import (
     describe_floating,
@@ -60,13 +60,13 @@ class RetargetingSettings:
 class RetargetedMotion:
     """A captured motion, and the same of a character."""
 
-    source: CapturedBody  # in the character's size and world, z up, where its ankles would be
+    source: CapturedBody  # the capture in the character's size and world, z up
     conventions: Conventions
     scale: float  # the character's lengths over the file's, in the file's unit
     contacts: Mapping[str, tuple[Contact, ...]]  # by point, such as `left_heel`
     turns: SegmentTurns  # the turns that were to be shown
     motion: GeneralizedPosition  # (f, n), (f, k, 4)
-    remarks: tuple[str, ...] = ()  # on the capture, a sentence each
+    remarks: tuple[str, ...] = ()  # a sentence each on the capture
 
 
 def read_body(

@@ -20,7 +20,7 @@ from msgs_config.geometry import rotations
 _UP, _LEFT, _AHEAD = np.eye(3)[2], np.eye(3)[1], np.eye(3)[0]
 _BENT = (0.15, 0.45)  # sines of the angle of knee or elbow between which its own axis takes over
 _MIN_FRAMES = 5  # frames on the ground that tell how a sole lies
-_TILTED = np.cos(np.radians(50.0))  # cosine of a sole's tilt at rest, beyond which it is no sole
+_SOLE_TILT_COSINE = np.cos(np.radians(50.0))  # a foot that is tilted more at rest has no sole
 
 Across = Callable[[FloatArray], FloatArray]
 """The axis (f, 3) about which a limb usually bends whose upper bone is (f, 3)."""
@@ -178,7 +178,7 @@ def _foot(
     up = _unit(-body.in_joint(ankle, shank[0]).mean(axis=0)) if up_at_rest is None else up_at_rest
     if flat.sum() >= _MIN_FRAMES:
         lying = _unit(shown_up[flat].mean(axis=0))
-        if up_at_rest is None or float(lying @ up_at_rest) > _TILTED:
+        if up_at_rest is None or float(lying @ up_at_rest) > _SOLE_TILT_COSINE:
             up = lying
     if tip is None:
         ahead = body.in_joint(ankle, np.cross(shank[1], -shank[0])).mean(axis=0)

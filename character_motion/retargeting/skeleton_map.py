@@ -24,7 +24,7 @@ _TRUNK = ("pelvis", "chest", "neck", "head")
 ROLES = (*_TRUNK, *(f"{side}_{part}" for part in _LIMB for side in SIDES))
 """What a joint can be. A pelvis carries both hips, a chest both arms."""
 _LEGS = [f"{side}_{part}" for part in ("hip", "knee", "ankle") for side in SIDES]
-_NEEDED = [*_LEGS, *(f"{side}_{part}" for part in ("shoulder", "elbow") for side in SIDES)]
+_REQUIRED_ROLES = [*_LEGS, *(f"{side}_{part}" for part in ("shoulder", "elbow") for side in SIDES)]
 _SHOWN_NAMES = 40
 
 Chain = Sequence[tuple[str, PartWeights]]
@@ -88,7 +88,7 @@ def find_map(
         if name not in names:
             raise ClipError(f"{place}: map: {role}: {one_of('joint', name, list(names))}")
         found[role] = list(names).index(name)
-    needed = _NEEDED if arms else _LEGS
+    needed = _REQUIRED_ROLES if arms else _LEGS
     missing = [role for role in needed if role not in found]
     if missing:
         raise ClipError(

@@ -11,19 +11,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from character_motion.retargeting.contacts import Contact, mask, spans
-from character_motion.retargeting.goals import MARGIN, link_motion
-from character_motion.retargeting.inverse_kinematics import Goals
+from character_motion.retargeting.optimisation.goals import MARGIN, Goals, link_motion
 from character_motion.retargeting.skeleton_map import SIDES
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
-_STANDING, _HAND = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
-_BLEND, _BLENDED = 0.06, 0.05  # s beside a stance in which it takes hold, and by what share at most
+_SOLE_WEIGHT, _HAND_WEIGHT = 1 / 0.001, 1 / 0.01  # 1/m, of points of soles and hands
+_BLEND_TIME = 0.06  # s beside a stance in which it takes hold
+_MAX_BLEND_SHARE = 0.05  # share by which it takes hold in that time
 _FLAT_COSINE = 0.7  # cosine of the tilt of a sole that is put flat on the ground
-_ALONG_GROUND = np.array((1.0, 1.0, 0.0))  # for a sole that is not put flat: along the ground
-_RAISED = 0.02  # m that a foot in the middle of its swing is lifted over the captured one
+# A sole that is not put flat is held along the ground alone.
+_ALONG_GROUND = np.array((1.0, 1.0, 0.0))
+_SWING_LIFT = 0.02  # m that a foot in the middle of its swing is lifted over the captured one
 _LEAST_LIFT, _USUAL_LIFT, _MOST_LIFT = 0.02, 0.03, 0.08  # m; usual where the capture allows it
 _LIFT_SPEED = 0.4  # m/s
 
@@ -100,9 +101,8 @@ def _hold_foot(
     )
     placed: list[_Placed] = []
     for part, contact in in_order:
-        lies = (
-            float(upright[contact.frames].mean()) < _FLAT_COSINE
-        )  # as in a crawl: on its toes or back
+        # In a crawl a foot lies on its toes or on its back.
+        lies = float(upright[contact.frames].mean()) < _FLAT_COSINE
         place = moving[contact.frames, part].mean(axis=0)
         if not lies:
             place = _beside(place, part, contact, placed, moving)
@@ -115,7 +115,7 @@ def _hold_foot(
         points.links.append(link)
         points.offsets.append(end)
         points.places.append(places[:, part])
-        points.weights.append(_STANDING * weights[:, part])
+        points.weights.append(_SOLE_WEIGHT * weights[:, part])
 
 
 @dataclass(frozen=True)
@@ -178,13 +178,13 @@ def _hold_hand(
     points.links.append(link)
     points.offsets.append(np.zeros(3))
     points.places.append(places)
-    points.weights.append(_HAND * weights)
+    points.weights.append(_HAND_WEIGHT * weights)
 
 
 def _hold(touches: BoolArray, frame_time: float) -> FloatArray:
     """How firmly (f,) a point is held that touches in some frames: less and less beside them."""
     away = _time_from(touches, frame_time)
-    return np.where(touches, 1.0, _BLENDED * np.maximum(1.0 - away / _BLEND, 0.0) ** 2)
+    return np.where(touches, 1.0, _MAX_BLEND_SHARE * np.maximum(1.0 - away / _BLEND_TIME, 0.0) ** 2)
 
 
 def _swing_clearance(stands: BoolArray, captured: FloatArray, frame_time: float) -> FloatArray:
@@ -198,7 +198,7 @@ def _swing_clearance(stands: BoolArray, captured: FloatArray, frame_time: float)
     for first, end in spans(~stands):
         quarter = (end - first) // 4
         lowest = captured[first + quarter : end - quarter].min()
-        raised = max(lowest + _RAISED, _USUAL_LIFT)
+        raised = max(lowest + _SWING_LIFT, _USUAL_LIFT)
         wanted[first:end] = min(raised, captured[first:end].max())
     in_time = _LIFT_SPEED * _time_from(stands, frame_time)
     lifted: FloatArray = np.minimum(np.clip(wanted, _LEAST_LIFT, _MOST_LIFT), in_time)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from character_motion.retargeting.capsules import Capsules, make_capsules
+from character_motion.retargeting.optimisation.capsules import Capsules, make_capsules
 from character_motion.retargeting.shape_points import balls, corners
 from character_motion.retargeting.skeleton_map import SIDES, SkeletonMap
 from character_motion.retargeting.target_joints import find_target_joints

@@ -21,12 +21,12 @@ from msgs_config.character.model import Character, Link
 from msgs_config.errors import ClipError, one_of
 from msgs_config.geometry import rotations
 
-_CROSSING = 1e-3  # smallest singular value over the largest, below which axes are parallel
+_PARALLEL_AXES = 1e-3  # smallest singular value over the largest, below which axes are parallel
 _ROLES_OF_PARTS = {
     part: role for chain in (LEG, ARM) for role, parts in chain for part in parts
 }  # the last role that a part may be
 _ARM_ROLES, _LEG_ROLES = ("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")
-_NUMBERED = (("leg", _LEG_ROLES, 5), ("arm", _ARM_ROLES, 4))
+_LIMBS_BY_ORDER = (("leg", _LEG_ROLES, 5), ("arm", _ARM_ROLES, 4))
 """Limbs whose joints may have numbers for names, and from how many on: three, one, and the rest."""
 Parts = Sequence[Sequence[tuple[str, str]]]
 """Of each link, the side and part that the names of its joint and of itself say."""
@@ -103,7 +103,7 @@ def _numbered(links: Sequence[Link], parts: Parts) -> dict[str, str]:
     """Links by role of legs and arms whose joints are called `leg_l1_joint` to `leg_l6_joint`."""
     found: dict[str, str] = {}
     for side in SIDES:
-        for word, roles, least in _NUMBERED:
+        for word, roles, least in _LIMBS_BY_ORDER:
             row = [
                 link.name
                 for link, names in zip(links, parts, strict=True)
@@ -177,6 +177,6 @@ def _nearest_to_lines(points: FloatArray, axes: FloatArray) -> FloatArray:
     across = np.eye(3) - axes[:, :, np.newaxis] * axes[:, np.newaxis]
     mean = points.mean(axis=0)
     missing = np.matmul(across, (points - mean)[..., np.newaxis])[..., 0].sum(axis=0)
-    offset, *_ = np.linalg.lstsq(across.sum(axis=0), missing, rcond=_CROSSING)
+    offset, *_ = np.linalg.lstsq(across.sum(axis=0), missing, rcond=_PARALLEL_AXES)
     nearest: FloatArray = mean + offset
     return nearest

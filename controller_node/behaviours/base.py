@@ -44,14 +44,14 @@ class Observation(NamedTuple):
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     contacts: FloatArray  # (links, 6) net wrenches of the tick before, world axes, N and N m
-    now: ReferenceState  # of the own reference
-    upcoming: ReferenceState  # of the own reference, one tick later
-    gains: GainArrays  # in force
-    whole_gains: GainArrays  # of joints at full strength
+    now: ReferenceState  # desired by the own reference
+    upcoming: ReferenceState  # desired by the own reference one tick later
+    gains: GainArrays  # the gains in force
+    whole_gains: GainArrays  # the gains of joints at full strength
     strengths: FloatArray  # (b,) the share of the whole gains that is in force
     assisted: bool  # whether the gains in force drive a floating base
     opponent: FloatArray | None = None  # (3,) m, world: the root of the opponent, if it has one
-    course: Course | None = None  # of a reference that is steered
+    course: Course | None = None  # what a steered reference is told
 
     def assistance(self, unless_none: object = "full") -> object:
         """The assistance for a report: "none" where the gains drive no floating base."""
@@ -79,7 +79,7 @@ class BehaviourOutput:
 class Behaviour(Protocol):
     """A state machine, one for each episode."""
 
-    carry: PlanarTransform  # of the own reference, to where the character goes on with it
+    carry: PlanarTransform  # takes the own reference to where the character goes on with it
 
     def advance(self, seen: Observation) -> BehaviourOutput:
         """The output of a tick; called once a tick, in order."""
@@ -122,7 +122,7 @@ class BehaviourChoice:
     make: Callable[[], Behaviour] = Tracking
     needs_contacts: bool = False
     opponent: str = ""  # the character whose place it needs, if it needs one
-    makes_effort: bool = False  # in place of a law and a trajectory's targets
+    makes_effort: bool = False  # it takes the place of a law and of a trajectory's targets
 
     def check(self, around: Surroundings) -> None:
         """Raise ConfigurationError if what it needs with each state is not there."""

@@ -6,7 +6,7 @@ from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character, Link, Shape, ShapeType
 from msgs_config.geometry import fixed_order, rotations
 
-_MOST_SPHERES = 12  # along one shape
+_MOST_SPHERES = 12  # spheres in a row along one shape
 
 
 class BoundingSpheres:

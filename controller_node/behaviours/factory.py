@@ -3,21 +3,27 @@
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine import factory as state_machine
+from controller_node.planner.settings import NO_PLANNER, RECORDED, PlannerParameters
 from controller_node.references import factory
 from controller_node.references.base import Motion
 from msgs_config.character.model import Character
-from msgs_config.parameters import Parameter, Values
+from msgs_config.errors import ConfigurationError
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
-BEHAVIOUR_PARAMETERS = [
-    Parameter(
-        "behaviour",
+
+class BehaviourSettings(Settings):
+    """What a character does beside tracking."""
+
+    behaviour: str = parameter(
         "tracking",
         "track whatever comes; be limp; track, and go limp on a hard hit; likewise, and go for an "
         "opponent; track, and react to a hit; or go through the states of a machine",
         choices=BEHAVIOURS.names,
-    ),
-    *BEHAVIOURS.parameters,
-]
+    )
+
+
+BEHAVIOUR_PARAMETERS = [*BehaviourSettings.declared(), *BEHAVIOURS.parameters]
 
 
 def make_motion(character: Character, values: Values) -> Motion:
@@ -26,14 +32,29 @@ def make_motion(character: Character, values: Values) -> Motion:
     Raises:
         ActuatedCharactersError: a file or a name does not exist, or does not fit the character.
     """
-    return state_machine.limited(factory.make_motion(character, values), values)
+    motion = factory.make_motion(character, values)
+    if BehaviourSettings.of(values).behaviour != state_machine.STATE_MACHINE:
+        return motion
+    return state_machine.limited(motion, values)
 
 
 def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
     """The behaviour of the parameter of that name; libraries of motion are read here, once.
 
     Raises:
-        ConfigurationError: a value is wrong, or the character cannot do it.
+        ConfigurationError: a value is wrong, the character cannot do it, or no planner with it.
         ClipError: a clip of the library is malformed.
     """
-    return BEHAVIOURS[values.text("behaviour")](character, values)
+    behaviour = BehaviourSettings.of(values).behaviour
+    _check_planner(behaviour, PlannerParameters.of(values).planner)
+    return BEHAVIOURS[behaviour](character, values)
+
+
+def _check_planner(behaviour: str, planner: str) -> None:
+    if planner == RECORDED and behaviour != "tracking":
+        wanted = "the behaviour tracking"
+    elif planner != NO_PLANNER and behaviour == "ragdoll":
+        wanted = "a behaviour that follows a motion"
+    else:
+        return
+    raise ConfigurationError(f"planner '{planner}' is for {wanted}; 'behaviour' is {behaviour}")

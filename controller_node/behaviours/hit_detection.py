@@ -20,7 +20,7 @@ from msgs_config.geometry import fixed_order
 WINDOW = 1.0 / 60.0  # s
 _GROUND_MARGIN = 0.03  # m, above the ground, z = 0
 _TOUCH_MARGIN = 0.03  # m, between two links
-_FRICTION = 0.9  # of a link against the ground; not less than the real one
+_FRICTION = 0.9  # friction of a link against the ground; not less than the real one
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from msgs_config.geometry import elementary, fixed_order, rotations
 
 _RATE = 30.0  # samples a second
 _WINDOW = 7  # samples, 0.2 s
-_SHORTEST = 0.05  # m, the least length of a link
+_MIN_LINK_LENGTH = 0.05  # m, the least length of a link
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def _lengths(character: Character) -> FloatArray:
         if link.parent >= 0:
             far = _length(link.joint.pose_in_parent.position)
             lengths[link.parent] = max(lengths[link.parent], far)
-    clipped: FloatArray = np.maximum(np.array(lengths), _SHORTEST)
+    clipped: FloatArray = np.maximum(np.array(lengths), _MIN_LINK_LENGTH)
     return clipped
 
 

@@ -10,7 +10,6 @@ Source: Reynolds 1999, "Steering Behaviors for Autonomous Characters": seek, and
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,43 +18,40 @@ from controller_node.behaviours.hit_detection import Hit
 from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.targets import ClipTarget
-from controller_node.planner.settings import NO_PLANNER
+from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
 _TURN_SPEED = 3.0  # rad/s, of the target's heading at most
-_STANDING = 0.8  # share of the own reference's root height: an opponent below it is down
+_STANDING_HEIGHT = 0.8  # share of the own reference's root height: an opponent below it is down
 _CLEARANCE = 2.0  # m, to which it goes away from an opponent that is down
-_NEAREST = 1e-3  # m; nearer than that no way leads to the opponent
+_MIN_DISTANCE = 1e-3  # m; nearer than that no way leads to the opponent
 _ONTO = 0.3  # s, until a strike's motion is reached
 
-PURSUIT_PARAMETERS = [
-    Parameter("opponent", "", "pursuit: the character that it goes for, by its name in the world"),
-    Parameter(
-        "pursuit.force",
-        400.0,
-        "pursuit: root force towards the opponent, within the effort limit of the root",
-        unit="N",
-    ),
-    Parameter("strike.reach", 0.9, "pursuit: it strikes where the roots are so near", unit="m"),
-    Parameter(
-        "strike.clips", [], "pursuit: clips to strike with, in turn; none named: none", texts=True
-    ),
-]
 
-
-@dataclass(frozen=True)
-class PursuitSettings:
+class PursuitSettings(Settings):
     """How an opponent is gone for."""
 
-    opponent: str
-    force: float  # N
-    reach: float  # m
-    strikes: tuple[str, ...]  # clips
+    opponent: str = parameter(
+        "", "pursuit: the character that it goes for, by its name in the world"
+    )
+    force: float = parameter(
+        400.0,
+        "pursuit: root force towards the opponent, within the effort limit of the root",
+        name="pursuit.force",
+        unit="N",
+    )
+    reach: float = parameter(
+        0.9, "pursuit: it strikes where the roots are so near", name="strike.reach", unit="m"
+    )
+    strikes: tuple[str, ...] = parameter(
+        (), "pursuit: clips to strike with, in turn; none named: none", name="strike.clips"
+    )
 
 
 def pursuit_settings(character: Character, values: Values) -> PursuitSettings:
@@ -64,26 +60,22 @@ def pursuit_settings(character: Character, values: Values) -> PursuitSettings:
     Raises:
         ConfigurationError: there is no opponent, or a planner; or a clip does not exist.
     """
-    if not values.text("opponent"):
+    settings = PursuitSettings.of(values)
+    if not settings.opponent:
         raise ConfigurationError(
             "parameter 'behaviour' is pursuit, which needs an 'opponent': another of several "
             "'characters' of sim_node"
         )
-    if values.text("planner") != NO_PLANNER:
+    if PlannerParameters.of(values).planner != NO_PLANNER:
         raise ConfigurationError(
             "parameter 'behaviour' is pursuit, whose way no planner can foresee; 'planner' must be "
             f"{NO_PLANNER}"
         )
     clips = available_clips(character)
-    for clip in values.texts("strike.clips"):
+    for clip in settings.strikes:
         if clip not in clips:
             raise ConfigurationError(one_of("clip in parameter 'strike.clips':", clip, clips))
-    return PursuitSettings(
-        opponent=values.text("opponent"),
-        force=values.number("pursuit.force"),
-        reach=values.number("strike.reach"),
-        strikes=values.texts("strike.clips"),
-    )
+    return settings
 
 
 class Pursuit(Reaction):
@@ -101,7 +93,7 @@ class Pursuit(Reaction):
     def advance(self, seen: Observation) -> BehaviourOutput:
         """As an active ragdoll, with the own reference where the opponent draws it."""
         output = super().advance(seen)
-        if self._target is self._own:
+        if self._target is self._own:  # the object of the own reference, not one that equals it
             self.carry = self._drawn(seen)
         else:
             self._heading = None
@@ -141,12 +133,14 @@ class Pursuit(Reaction):
         """The way to the opponent, m, world; ahead if it is here."""
         assert seen.opponent is not None
         x, y = (seen.opponent - seen.position[:3])[:2].tolist()
-        return (x, y) if _length((x, y)) > _NEAREST else (_NEAREST, 0.0)
+        return (x, y) if _length((x, y)) > _MIN_DISTANCE else (_MIN_DISTANCE, 0.0)
 
     def _is_down(self, seen: Observation) -> bool:
         """Whether the opponent lies, or is yet to stand up."""
         assert seen.opponent is not None
-        return float(seen.opponent[2]) < _STANDING * float(seen.now.configuration.position[2])
+        return float(seen.opponent[2]) < _STANDING_HEIGHT * float(
+            seen.now.configuration.position[2]
+        )
 
     def _drawn(self, seen: Observation) -> PlanarTransform:
         """The move of the reference to ahead of the body, with a heading to the opponent.

@@ -47,9 +47,9 @@ class ReactionKit:
     settings: ReactionSettings
     model: DynamicsModel
     posture: Posture
-    period: float  # s, of control
-    library: MotionLibrary | None = None  # of a behaviour that searches
-    get_ups: MotionLibrary | None = None  # of one that gets up by a clip
+    period: float  # control period, s
+    library: MotionLibrary | None = None  # where a behaviour searches
+    get_ups: MotionLibrary | None = None  # where a behaviour finds a clip to get up by
     plans: bool = False  # a planner counts with the gains in force for as far as it looks
 
 

@@ -7,25 +7,31 @@ import numpy as np
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.posture import Posture
-from controller_node.behaviours.pursuit import PURSUIT_PARAMETERS, Pursuit, pursuit_settings
+from controller_node.behaviours.pursuit import Pursuit, PursuitSettings, pursuit_settings
 from controller_node.behaviours.reaction import Reaction, ReactionKit
-from controller_node.behaviours.settings import REACTION_PARAMETERS, reaction_settings
-from controller_node.planner.settings import NO_PLANNER
+from controller_node.behaviours.settings import ReactionSettings, reaction_settings
+from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.parameters import Values
+from msgs_config.shared_parameters import SharedSettings
 
-_LYING = 0.5  # the part of a get-up clip in which it may begin
+_LYING_PART = 0.5  # the part of a get-up clip in which it may begin
 
 
-@BEHAVIOURS.register("active_ragdoll", *REACTION_PARAMETERS)
-@BEHAVIOURS.register("reactive")
-def _reaction(character: Character, values: Values) -> BehaviourChoice:
+@BEHAVIOURS.register("active_ragdoll", ReactionSettings)
+def _active_ragdoll(character: Character, values: Values) -> BehaviourChoice:
     kit = _make_kit(character, values)
     return BehaviourChoice(partial(Reaction, kit), needs_contacts=True)
 
 
-@BEHAVIOURS.register("pursuit", *PURSUIT_PARAMETERS)
+@BEHAVIOURS.register("reactive")
+def _reactive(character: Character, values: Values) -> BehaviourChoice:
+    kit = _make_kit(character, values, searches=True)
+    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True)
+
+
+@BEHAVIOURS.register("pursuit", PursuitSettings)
 def _pursuit(character: Character, values: Values) -> BehaviourChoice:
     settings = pursuit_settings(character, values)
     kit, strikes = _make_kit(character, values), None
@@ -36,24 +42,24 @@ def _pursuit(character: Character, values: Values) -> BehaviourChoice:
     )
 
 
-def _make_kit(character: Character, values: Values) -> ReactionKit:
-    posture = Posture(character)
-    settings = reaction_settings(character, values)
+def _make_kit(character: Character, values: Values, *, searches: bool = False) -> ReactionKit:
+    posture, shared = Posture(character), SharedSettings.of(values)
+    settings = reaction_settings(character, values, searches=searches)
     library = get_ups = None
     if settings.searches:
         library = MotionLibrary(character, settings.library, settings.blend_duration)
     if settings.by_clip:
         sides = [settings.face_up, settings.face_down]
-        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING)
+        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING_PART)
     kit = ReactionKit(
         character=character,
         settings=settings,
-        model=DynamicsModel(character, values.number("gravity")),
+        model=DynamicsModel(character, shared.gravity),
         posture=posture,
-        period=1.0 / values.integer("rate"),
+        period=shared.period,
         library=library,
         get_ups=get_ups,
-        plans=values.text("planner") != NO_PLANNER,
+        plans=PlannerParameters.of(values).planner != NO_PLANNER,
     )
     rest = np.array(character.rest_position)
     for made in (library, get_ups):

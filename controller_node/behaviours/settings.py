@@ -1,85 +1,87 @@
-"""The parameters of the behaviours that react to hits, checked."""
+"""The settings of the behaviours that react to hits, checked."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 
 _TELLS_HITS = ("active_ragdoll", "pursuit", "reactive")
 
-REACTION_PARAMETERS = [
-    Parameter("hit.threshold", 3.0, "impulse of contacts that counts as a hit", unit="N s"),
-    Parameter("limp.threshold", 30.0, "impulse of a hit that makes it limp", unit="N s"),
-    Parameter(
-        "react.duration",
+
+class ReactionSettings(Settings):
+    """The settings of `active_ragdoll`, `pursuit` and `reactive`."""
+
+    hit_threshold: float = parameter(
+        3.0, "impulse of contacts that counts as a hit", name="hit.threshold", unit="N s"
+    )
+    limp_threshold: float = parameter(
+        30.0, "impulse of a hit that makes it limp", name="limp.threshold", unit="N s"
+    )
+    react_duration: float = parameter(
         0.25,
         "how long it gives way to a hit of two thirds of limp.threshold or more; to a lighter one "
         "in proportion, at least 1/60 s",
+        name="react.duration",
         unit="s",
         minimum=0.01,
         maximum=10,
-    ),
-    Parameter("react.softness", 0.2, "strength of the joints at the struck link", maximum=1.0),
-    Parameter(
-        "react.assistance",
+    )
+    softness: float = parameter(
+        0.2, "strength of the joints at the struck link", name="react.softness", maximum=1.0
+    )
+    assistance: float = parameter(
         0.2,
         "largest root force while it gives way, as a share of the weight",
+        name="react.assistance",
         maximum=1.0,
-    ),
-    Parameter(
-        "blend.duration",
+    )
+    blend_duration: float = parameter(
         0.5,
         "how long it follows the motion that was found, and how long it takes to come back",
+        name="blend.duration",
         unit="s",
         minimum=0.05,
         maximum=60.0,
-    ),
-    Parameter(
-        "library",
-        [],
+    )
+    library: tuple[str, ...] = parameter(
+        (),
         "clips that a reaction may go on with: names, files, or folders of them; none named: all",
-        texts=True,
-    ),
-    Parameter("upright.torque", 150.0, "active_ragdoll, pursuit: largest root torque", unit="N m"),
-    Parameter(
-        "recovery",
+    )
+    upright_torque: float = parameter(
+        150.0,
+        "active_ragdoll, pursuit: largest root torque",
+        name="upright.torque",
+        unit="N m",
+    )
+    recovery: str = parameter(
         "clip",
         "get up by a get-up clip, or straight back into the reference",
         choices=("clip", "ramp"),
-    ),
-    Parameter(
-        "recovery.duration",
+    )
+    recovery_duration: float = parameter(
         1.0,
         "in which the strengths come back from limp",
+        name="recovery.duration",
         unit="s",
         minimum=0.05,
         maximum=60.0,
-    ),
-    Parameter("getup.faceup", "getup_faceup", "clip that gets up from lying on the back"),
-    Parameter("getup.facedown", "getup_facedown", "clip that gets up from lying on the front"),
-]
+    )
+    face_up: str = parameter(
+        "getup_faceup", "clip that gets up from lying on the back", name="getup.faceup"
+    )
+    face_down: str = parameter(
+        "getup_facedown", "clip that gets up from lying on the front", name="getup.facedown"
+    )
+    searches: bool = False  # whether it searches the library: the behaviour `reactive`
 
-
-@dataclass(frozen=True)
-class ReactionSettings:
-    """The settings of `active_ragdoll`, `pursuit` and `reactive`."""
-
-    searches: bool  # whether it searches the library: the behaviour `reactive`
-    hit_threshold: float  # N s
-    limp_threshold: float  # N s
-    react_duration: float  # s
-    softness: float
-    assistance: float  # largest root force while it gives way, in weights
-    blend_duration: float  # s
-    library: tuple[str, ...]
-    upright_torque: float  # N m, of active_ragdoll and pursuit
-    by_clip: bool  # whether it gets up by a clip
-    recovery_duration: float  # s
-    face_up: str  # the get-up clips of lying on the back, and on the front
-    face_down: str
+    @property
+    def by_clip(self) -> bool:
+        """Whether it gets up by a clip."""
+        return self.recovery == "clip"
 
 
 def check_terrain(behaviour: str, terrain: object) -> None:
@@ -94,36 +96,23 @@ def check_terrain(behaviour: str, terrain: object) -> None:
         )
 
 
-def reaction_settings(character: Character, values: Values) -> ReactionSettings:
+def reaction_settings(character: Character, values: Values, *, searches: bool) -> ReactionSettings:
     """The settings that the parameters' values say.
 
     Raises:
         ConfigurationError: the thresholds are in the wrong order, or a clip does not exist.
     """
-    hit, limp = values.number("hit.threshold"), values.number("limp.threshold")
+    settings = replace(ReactionSettings.of(values), searches=searches)
+    hit, limp = settings.hit_threshold, settings.limp_threshold
     if limp < hit:
         raise ConfigurationError(
             f"parameter 'limp.threshold' is {limp:g} N s; it must be 'hit.threshold', {hit:g} N s, "
             "or more"
         )
-    by_clip = values.text("recovery") == "clip"
     clips = available_clips(character)
-    for name in ("getup.faceup", "getup.facedown"):
-        if by_clip and values.text(name) not in clips:
-            wrong = one_of(f"clip in parameter '{name}':", values.text(name), clips)
+    get_ups = {"getup.faceup": settings.face_up, "getup.facedown": settings.face_down}
+    for name, clip in get_ups.items():
+        if settings.by_clip and clip not in clips:
+            wrong = one_of(f"clip in parameter '{name}':", clip, clips)
             raise ConfigurationError(f"{wrong}; with 'recovery' at 'ramp' it needs none")
-    return ReactionSettings(
-        searches=values.text("behaviour") == "reactive",
-        hit_threshold=hit,
-        limp_threshold=limp,
-        react_duration=values.number("react.duration"),
-        softness=values.number("react.softness"),
-        assistance=values.number("react.assistance"),
-        blend_duration=values.number("blend.duration"),
-        library=values.texts("library"),
-        upright_torque=values.number("upright.torque"),
-        by_clip=by_clip,
-        recovery_duration=values.number("recovery.duration"),
-        face_up=values.text("getup.faceup"),
-        face_down=values.text("getup.facedown"),
-    )
+    return settings

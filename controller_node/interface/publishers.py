@@ -34,11 +34,11 @@ class Reply(NamedTuple):
     state: StampedState
     effort: FloatArray  # (n,), of which the commanded entries are sent
     torques: bytes  # the serialised message
-    session: str  # of the simulator whose state it is
+    session: str  # session of the simulator whose state it answers
     reference: StampedReference
 
 
-class Publishers:
+class ControllerPublishers:
     """The publishers of a controller. A topic without subscribers costs nothing."""
 
     def __init__(
@@ -167,6 +167,7 @@ class Publishers:
         The mode's report tells since when and why it holds; `stamp_ns` is that of the state in
         which the plan was made.
         """
+        # A plan in force has one outlook object: another one is that of a new plan.
         if outlook is not None and outlook is not self._published_outlook:
             self._published_outlook = outlook
             if has_subscribers(self._plans):

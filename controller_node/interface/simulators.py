@@ -30,7 +30,7 @@ class _KnownSimulator:
     """The configuration and episode that one simulator published."""
 
     configuration: RunConfiguration | None = None
-    error: ActuatedCharactersError | None = None  # why this controller is not made for it
+    error: ActuatedCharactersError | None = None  # says why this controller does not fit it
     episode_ns: int | None = None
 
 
@@ -83,7 +83,7 @@ class Simulators:
             "rejected_episodes": counts[topics.EPISODE.name] + self._rejected_episodes,
         }
 
-    def look(self, now: float) -> None:
+    def take_messages(self, now: float) -> None:
         """Take episodes and configurations of simulators; `now` in s of wall time.
 
         Raises:
@@ -91,7 +91,7 @@ class Simulators:
                 than this controller was made for. Without one it waits for a simulator that fits.
         """
         self._now = now
-        self._binding.look(now)
+        self._binding.note_look(now)
         self._take_episode()
         self._take_configuration()
 

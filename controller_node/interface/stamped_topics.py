@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any
 
 from controller_node.controller import Controller
-from controller_node.interface.publishers import Publishers
+from controller_node.interface.publishers import ControllerPublishers
 from controller_node.interface.stamped_message import decode_stamped
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
@@ -24,7 +24,11 @@ class StampedTopics:
     """
 
     def __init__(
-        self, node: BusNode, controller: Controller, outputs: Publishers, logger: OnceLogger
+        self,
+        node: BusNode,
+        controller: Controller,
+        outputs: ControllerPublishers,
+        logger: OnceLogger,
     ) -> None:
         self._outputs, self._logger = outputs, logger
         self._subscribe = partial(StampedSubscription, node, rejection="refused ", logger=logger)

@@ -23,7 +23,7 @@ _TURNS_IN = 1.0  # s, time constant with which the heading gives way
 _RETURNS_IN = 3.0  # s, time constant of place and heading on the way back
 _TRAVELS = 0.02  # m/s of the reference's centre of mass from which on it goes somewhere
 _TURNS = 0.02  # rad/s of the reference's root about z from which on it goes somewhere
-_SLOWLY = 0.15  # m/s, at most, of the place on the way back
+_RETURN_SPEED = 0.15  # m/s, at most, of the place on the way back
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class Anchor:
         away = _turn(self.yaw) * centre + self.place - centre
         share = min(elapsed / _RETURNS_IN, 1.0)
         yaw = (1.0 - share) * self.yaw
-        if share * _length(away) > _SLOWLY * elapsed:
-            share = _SLOWLY * elapsed / _length(away)
+        if share * _length(away) > _RETURN_SPEED * elapsed:
+            share = _RETURN_SPEED * elapsed / _length(away)
         place = centre + (1.0 - share) * away - _turn(yaw) * centre
         return replace(self, place=place, yaw=yaw)
 

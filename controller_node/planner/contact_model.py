@@ -28,10 +28,10 @@ _SOLVER_ITERATIONS = 6
 _CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world
 _LIMIT = (0.01, 1.0)  # time constant in s and damping ratio of the limits of hinges and sliders
 
-_UNUSED = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # MuJoCo's parts
+_UNUSED_PARTS = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # MuJoCo's parts
 
 _GROUND = "ground"
-_BY_PAIRS = {"contype": 0, "conaffinity": 0}  # of a shape: explicit pairs say what may touch
+_BY_PAIRS = {"contype": 0, "conaffinity": 0}  # explicit pairs say which shapes may touch
 
 _GEOMETRIES = {
     ShapeType.BOX: mujoco.mjtGeom.mjGEOM_BOX,
@@ -167,7 +167,7 @@ def _compile(
     option.tolerance = 0.0  # always the same number of iterations
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.disableflags = sum(
-        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _UNUSED
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _UNUSED_PARTS
     )
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), name=_GROUND, **_BY_PAIRS)

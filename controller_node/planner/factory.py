@@ -8,10 +8,14 @@ from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import (
     NO_PLANNER,
+    PREDICTIVE,
     RECORDED,
+    PlannerParameters,
     check_planner,
     make_planner_settings,
 )
+from controller_node.references.clip import ClipSettings
+from controller_node.references.factory import MotionSettings
 from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
@@ -26,10 +30,10 @@ if TYPE_CHECKING:
 
 def check_planning(character: Character, values: Values) -> None:
     """Raise ActuatedCharactersError as `make_planner`, but for what is not installed."""
-    name = values.text("planner")
+    name = PlannerParameters.of(values).planner
     if name == NO_PLANNER:
         return
-    check_planner(character, values)
+    check_planner(character, name)
     if name == RECORDED:
         _recorded_plan(character, values)
     else:
@@ -38,10 +42,9 @@ def check_planning(character: Character, values: Values) -> None:
 
 def check_installed(values: Values) -> None:
     """Raise ConfigurationError, with how to get it, where the planner's extra is not installed."""
-    name = values.text("planner")
-    delayed = values.integer(COMMAND_DELAY.name) > 0
-    if name != NO_PLANNER and (name != RECORDED or delayed):
-        require_extra("plan", f"planner '{name}'")
+    given = PlannerParameters.of(values)
+    if given.planner == PREDICTIVE or (given.planner == RECORDED and given.delay > 0):
+        require_extra("plan", f"planner '{given.planner}'")
 
 
 def make_planner(character: Character, values: Values) -> Planner | None:
@@ -51,29 +54,28 @@ def make_planner(character: Character, values: Values) -> Planner | None:
         ActuatedCharactersError: it cannot be had for the character, or beside the other values; or
             the clip's file has no plan, or a malformed one.
     """
-    name = values.text("planner")
+    name = PlannerParameters.of(values).planner
     if name == NO_PLANNER:
         return None
-    check_planner(character, values)
+    check_planner(character, name)
     if name == RECORDED:
         plan = _recorded_plan(character, values)
         return RecordedPlanner(plan, _commands_in_flight(character, values))
     settings = make_planner_settings(character, values)
     with saying_what_it_needs(name):
         from controller_node.planner.planner import PredictivePlanner
-    return PredictivePlanner(
-        character, settings, rate_hz=values.integer("rate"), gravity=values.number("gravity")
-    )
+    return PredictivePlanner(character, settings)
 
 
 def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
     """The plan in a clip's file, at this controller's rate."""
-    clip, rate = values.text("clip"), values.integer("rate")
-    plan = ReconstructedClip(character, clip).plan if values.text("reference") == "clip" else None
+    clip, rate = ClipSettings.of(values).clip, PlannerParameters.of(values).rate_hz
+    is_clip = MotionSettings.of(values).reference == "clip"
+    plan = ReconstructedClip(character, clip).plan if is_clip else None
     if plan is None:
         raise ConfigurationError(
-            f"planner '{RECORDED}' plays the plan in a file of `reconstruct`; the clip '{clip}' "
-            "has none"
+            f"planner '{RECORDED}' plays the plan in a file of `motion reconstruct`; the clip "
+            f"'{clip}' has none"
         )
     if plan.rate_hz != rate:
         raise ConfigurationError(
@@ -84,19 +86,19 @@ def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
 
 def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlight | None":
     """The commands on their way, where they take a tick or more."""
-    delay = values.integer(COMMAND_DELAY.name)
-    if not delay:
+    given = PlannerParameters.of(values)
+    if not given.delay:
         return None
     with saying_what_it_needs(f"{RECORDED}' with '{COMMAND_DELAY.name}"):
         from controller_node.planner.commands_in_flight import CommandsInFlight
         from controller_node.planner.contact_model import ContactModel
     model = ContactModel(
         character,
-        period_s=1.0 / values.integer("rate"),
-        gravity=values.number("gravity"),
-        friction=values.number("plan.friction"),
+        period_s=1.0 / given.rate_hz,
+        gravity=given.gravity,
+        friction=given.friction,
     )
-    return CommandsInFlight(character, model, delay)
+    return CommandsInFlight(character, model, given.delay)
 
 
 @contextmanager

@@ -14,4 +14,4 @@ class Outlook:
     centres: FloatArray  # (checks, 3) m, centres of mass in the world
     costs: FloatArray  # (checks,) of the deviations from the reference; the plan's is their sum
     alternatives: FloatArray  # (checks,) costs of the best other plan that was tried
-    anchor: Anchor  # where the reference's world was put
+    anchor: Anchor  # puts the reference's world where it gave way to

@@ -9,7 +9,7 @@ from controller_node.planner.settings import PlannerSettings
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 
-_FADING = 0.7  # factor on sensitivities from plan to plan
+_SENSITIVITY_DECAY = 0.7  # factor on sensitivities from plan to plan
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Plan:
         for knot, area in enumerate(areas):
             before = knot + tick // settings.knots - self.offsets.first_knot
             if before < len(known) and self.areas[before] > 0.0:
-                share = _FADING * min(1.0, area / self.areas[before])
+                share = _SENSITIVITY_DECAY * min(1.0, area / self.areas[before])
                 faded[knot] = share * known[before][:, checks]
         return faded.reshape(len(areas) * width, -1)
 

@@ -70,33 +70,34 @@ class _FoundPlan(Future[Plan]):
 class PredictivePlanner:
     """Plans for one character. It remembers its last plan, until an episode begins.
 
-    Plans are sought by a thread of their own. For the ticks of `PlannerSettings.planning_delay` the
-    plan before goes on acting; a plan that has not been found by then is waited for.
+    Plans are sought by a thread of their own. For the ticks of `planning_delay` the plan before
+    goes on acting; a plan that has not been found by then is waited for.
     """
 
-    def __init__(
-        self, character: Character, settings: PlannerSettings, *, rate_hz: int, gravity: float
-    ) -> None:
+    def __init__(self, character: Character, settings: PlannerSettings) -> None:
         """Build the model of the world, once for each thread.
 
         The first time on a machine the rollouts are compiled, which takes half a minute.
         """
-        self._made_of = (character, settings, rate_hz, gravity)
-        self.settings = settings
+        self._made_of = (character, settings)
+        self.settings, given = settings, settings.parameters
         self._model = ContactModel(
-            character, period_s=1.0 / rate_hz, gravity=gravity, friction=settings.friction
+            character,
+            period_s=1.0 / given.rate_hz,
+            gravity=given.gravity,
+            friction=given.friction,
         )
-        self._rollouts = RolloutPool(self._model, settings.workers)
+        self._rollouts = RolloutPool(self._model, given.threads)
         self.in_flight = (
-            CommandsInFlight(character, self._model, settings.delay) if settings.delay else None
+            CommandsInFlight(character, self._model, given.delay) if given.delay else None
         )
         self._residual_model = ResidualModel(character, self._model, settings)
-        self._search = PlanSearch(self._rollouts, self._residual_model, settings, rate_hz)
+        self._search = PlanSearch(self._rollouts, self._residual_model, settings)
         self._reference = SampledReference(self._model, self._rollouts, settings)
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], object] = int  # called while it waits; `int` does nothing
-        self._rate_hz = rate_hz
-        self._seed = settings.seed
+        self._rate_hz = given.rate_hz
+        self._seed = given.seed
         self._episode = 0
         self._plan: Plan | None = None
         self._coming: PendingPlan | None = None
@@ -174,7 +175,7 @@ class PredictivePlanner:
             self._coming = self._start_search(tick, tick, state, gains, desired_at)
             self._take(tick)
         assert self._plan is not None
-        acts = tick + self.settings.planning_delay
+        acts = tick + self.settings.parameters.planning_delay
         if self._coming is None and acts >= self._plan.tick + self.settings.period:
             self._coming = self._start_search(tick, acts, state, gains, desired_at)
             self._take(tick)
@@ -226,7 +227,7 @@ class PredictivePlanner:
             return
         if tick < plan.tick:
             self.rest()
-        elif tick - plan.tick >= settings.horizon - settings.planning_delay:
+        elif tick - plan.tick >= settings.horizon - settings.parameters.planning_delay:
             self._abandon_search()
             self._plan = None
         elif self._coming is not None and tick < self._coming.seen:
@@ -279,7 +280,7 @@ class PredictivePlanner:
         position = self._model.position_of(state.position)
         # A message's array cannot be written to, which is another type to compiled code.
         velocity = state.velocity.copy()
-        if not self.settings.gives_way:
+        if not self.settings.parameters.gives_way:
             return position, velocity
         seen = self._anchor.to_reference_world(position, velocity)
         features = self._rollouts.features_of(*seen, body)
@@ -298,10 +299,9 @@ class PredictivePlanner:
         return planar_state(position, velocity, *self._residual_model.balance(features))
 
 
-def _copy_of(made_of: tuple[Character, PlannerSettings, int, float], state: Any) -> object:
+def _copy_of(made_of: tuple[Character, PlannerSettings], state: Any) -> object:
     """The copy of a planner that was made of these, in its state."""
-    character, settings, rate_hz, gravity = made_of
-    copy = PredictivePlanner(character, settings, rate_hz=rate_hz, gravity=gravity)
+    copy = PredictivePlanner(*made_of)
     copy._seed, copy._episode, copy._plan, copy._coming, copy._anchor, sent = state
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)

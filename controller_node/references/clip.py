@@ -13,7 +13,8 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import ClipFrames, read_clip
 from msgs_config.geometry import rotations
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
 _BLEND_TIME = 0.15  # s before the wrap, over which the gap to the first frame is closed
 
@@ -47,7 +48,7 @@ class ClipReference:
         self._velocities = self._segment_velocities()
         self._no_acceleration = np.zeros(layout.size)
         self._last = self._at_end()
-        self._cycle_motions: dict[int, _CycleMotion] = {}  # of this cycle and the next
+        self._cycle_motions: dict[int, _CycleMotion] = {}  # this cycle's and the next one's
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the clip's first frame."""
@@ -169,12 +170,17 @@ def _cycle_turn(root_xyzw: FloatArray) -> FloatArray:
     return rotations.yaw(rotations.multiply(root_xyzw[-1], rotations.conjugate(root_xyzw[0])))
 
 
-@REFERENCES.register(
-    "clip",
-    Parameter("clip", "walk", "name of a clip of the character, or path of a .txt or .json file"),
-)
+class ClipSettings(Settings):
+    """The clip that is tracked."""
+
+    clip: str = parameter(
+        "walk", "name of a clip of the character, or path of a .txt or .json file"
+    )
+
+
+@REFERENCES.register("clip", ClipSettings)
 def _clip(character: Character, values: Values) -> Motion:
-    frames = read_clip(character, values.text("clip"))
+    frames = read_clip(character, ClipSettings.of(values).clip)
     names = ", ".join(frames.clamped)
     warnings = (f"kept within joint limits: {names}",) if names else ()
     return Motion(ClipReference(character.layout, frames), warnings)

@@ -4,18 +4,22 @@ from controller_node.references import clip, hold, keyframes, signals  # noqa: F
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.steering import factory as steering  # noqa: F401  registers its own
 from msgs_config.character.model import Character
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
-MOTION_PARAMETERS = [
-    Parameter(
-        "reference",
+
+class MotionSettings(Settings):
+    """Which motion is tracked."""
+
+    reference: str = parameter(
         "hold",
         "what to track: the rest pose, keyframes, a motion clip, a test signal from the rest "
         "pose, or a walk steered by cmd_vel; a message on ~/joint_trajectory replaces it",
         choices=REFERENCES.names,
-    ),
-    *REFERENCES.parameters,
-]
+    )
+
+
+MOTION_PARAMETERS = [*MotionSettings.declared(), *REFERENCES.parameters]
 
 
 def make_motion(character: Character, values: Values) -> Motion:
@@ -24,4 +28,4 @@ def make_motion(character: Character, values: Values) -> Motion:
     Raises:
         ActuatedCharactersError: a file or a name does not exist, or does not fit the character.
     """
-    return REFERENCES[values.text("reference")](character, values)
+    return REFERENCES[MotionSettings.of(values).reference](character, values)

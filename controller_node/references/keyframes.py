@@ -13,12 +13,13 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.file_kinds import refuse_other_kind
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
 KEYFRAMES_DIRECTORY = Path(__file__).parent / "data"
 
 _SHARES = np.linspace(0.0, 1.0, 65)  # shares of a segment, where its path is compared with limits
-_NOTICED = 1e-6  # rad or m beyond a limit that lead to a warning
+_LIMIT_TOLERANCE = 1e-6  # rad or m beyond a limit that lead to a warning
 _FILES = (".yaml", ".yml")
 
 
@@ -105,7 +106,7 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
         times, values = curve.coordinate(index, _SHARES)
         beyond = np.maximum(lower[index] - values, values - upper[index])
         worst = np.unravel_index(beyond.argmax(), beyond.shape)
-        if beyond[worst] > _NOTICED:
+        if beyond[worst] > _LIMIT_TOLERANCE:
             warnings.append(
                 f"the path between keyframes leaves the limits of "
                 f"'{character.layout.dof_names[index]}', {limits.text(index)}, by "
@@ -115,11 +116,15 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-@REFERENCES.register(
-    "keyframes", Parameter("keyframes", "", "name of shipped keyframes, or path of a .yaml file")
-)
+class KeyframesSettings(Settings):
+    """The keyframes that are tracked."""
+
+    keyframes: str = parameter("", "name of shipped keyframes, or path of a .yaml file")
+
+
+@REFERENCES.register("keyframes", KeyframesSettings)
 def _keyframes(character: Character, values: Values) -> Motion:
-    keyframes = read_keyframes(character, str(_path(values.text("keyframes"))))
+    keyframes = read_keyframes(character, str(_path(KeyframesSettings.of(values).keyframes)))
     reference = KeyframesReference(character.layout, keyframes)
     return Motion(reference, overshoots(character, keyframes))
 

@@ -20,7 +20,7 @@ def knot_before(tick: int, knot_ticks: int) -> tuple[int, float]:
 class Offsets:
     """Offsets of the actuated entries; ticks count from the episode's first state."""
 
-    knot_ticks: int  # from one knot to the next; the first one of all is at tick 0
+    knot_ticks: int  # ticks from one knot to the next; the first one of all is at tick 0
     first_knot: int
     rows: FloatArray  # (k, n - 6) at the knots, rad or m; a rotation's in the child frame
 

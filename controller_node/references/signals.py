@@ -12,7 +12,8 @@ from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
 from msgs_config.geometry import rotations
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
 
 
 class StepReference:
@@ -81,35 +82,40 @@ class SineReference:
         )
 
 
-_DOFS = Parameter(
-    "signal.dofs",
-    [],
-    "degrees of freedom that step or sine moves; none named: all that have a motor and may",
-    texts=True,
-)
+class SignalSettings(Settings, prefix="signal."):
+    """What any test signal moves."""
+
+    dofs: tuple[str, ...] = parameter(
+        (), "degrees of freedom that step or sine moves; none named: all that have a motor and may"
+    )
 
 
-@REFERENCES.register(
-    "step",
-    Parameter("step.size", 0.1, "how far the step goes", unit="rad or m", minimum=-1e6),
-    Parameter("step.time", 0.5, "when, since the episode began", unit="s"),
-)
+class StepSettings(Settings, prefix="step."):
+    """The step of `StepReference`."""
+
+    size: float = parameter(0.1, "how far the step goes", unit="rad or m", minimum=-1e6)
+    time: float = parameter(0.5, "when, since the episode began", unit="s")
+
+
+class SineSettings(Settings, prefix="sine."):
+    """The sine of `SineReference`."""
+
+    amplitude: float = parameter(0.1, "how far the sine goes", unit="rad or m", minimum=-1e6)
+    frequency: float = parameter(0.5, "how often a second", unit="Hz")
+
+
+@REFERENCES.register("step", StepSettings)
 def _step(character: Character, values: Values) -> Motion:
-    size, time = values.number("step.size"), values.number("step.time")
-    dofs, warnings = _signal_dofs(character, values, [size])
-    return Motion(StepReference(character, dofs, size, time), warnings)
+    step = StepSettings.of(values)
+    dofs, warnings = _signal_dofs(character, values, [step.size])
+    return Motion(StepReference(character, dofs, step.size, step.time), warnings)
 
 
-@REFERENCES.register(
-    "sine",
-    _DOFS,
-    Parameter("sine.amplitude", 0.1, "how far the sine goes", unit="rad or m", minimum=-1e6),
-    Parameter("sine.frequency", 0.5, "how often a second", unit="Hz"),
-)
+@REFERENCES.register("sine", SignalSettings, SineSettings)
 def _sine(character: Character, values: Values) -> Motion:
-    amplitude, frequency = values.number("sine.amplitude"), values.number("sine.frequency")
-    dofs, warnings = _signal_dofs(character, values, [amplitude, -amplitude])
-    return Motion(SineReference(character, dofs, amplitude, frequency), warnings)
+    sine = SineSettings.of(values)
+    dofs, warnings = _signal_dofs(character, values, [sine.amplitude, -sine.amplitude])
+    return Motion(SineReference(character, dofs, sine.amplitude, sine.frequency), warnings)
 
 
 def _signal_dofs(
@@ -119,7 +125,7 @@ def _signal_dofs(
 
     If none are named: all that have a motor, except those whose limits an offset would leave.
     """
-    named = values.texts("signal.dofs")
+    named = SignalSettings.of(values).dofs
     if named:
         return named, ()
     layout, rest = character.layout, np.array(character.rest_position)

@@ -21,7 +21,7 @@ from msgs_config.errors import LayoutError, MotionError
 _SAME_POSITION = 1e-3  # rad or m that a first point at time 0 may be away from the reference
 _MOST_WAITING = 100  # trajectories
 _MOST_POINTS = 10_000
-_STOPPED = 1e-6  # rad/s or m/s
+_REST_SPEED = 1e-6  # rad/s or m/s
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _check_numbers(points: TrajectoryPoints) -> None:
                 right = f"from {-LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
                 raise _wrong(points, (row, column), what, array, right)
     if points.velocities is not None:
-        for (column,) in np.argwhere(np.abs(points.velocities[-1]) > _STOPPED)[:1].tolist():
+        for (column,) in np.argwhere(np.abs(points.velocities[-1]) > _REST_SPEED)[:1].tolist():
             raise MotionError(
                 f"trajectory: the last point's velocity of '{points.dof_names[column]}' is "
                 f"{points.velocities[-1, column]:g}; it must be 0, for there the motion ends"
@@ -247,7 +247,7 @@ def _check_first(
 
 def _lead(layout: JointLayout, start: float, now: ReferenceState, knots: Knots) -> Knots:
     """The knots of the quintic from the state at `start` to the beginning of the motion."""
-    begin = Curve(layout, knots).sample(float(knots.times[0]))  # at rest if there is one knot
+    begin = Curve(layout, knots).sample(float(knots.times[0]))  # a curve of one knot is at rest
     velocity = begin.velocity if knots.velocities is None else knots.velocities[0]
     acceleration = begin.acceleration if knots.accelerations is None else knots.accelerations[0]
     present, first = now.configuration, knots.configurations

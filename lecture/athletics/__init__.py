@@ -6,7 +6,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.recording_metrics import has_fallen
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import mode_events
 from lecture.athletics.drawing import (
     draw_courses,
     draw_jump,
@@ -14,7 +14,7 @@ from lecture.athletics.drawing import (
     draw_pushes,
 )
 from lecture.athletics.measures import (
-    Course,
+    CourseSeries,
     commanded,
     longest_flight,
     taken,
@@ -31,13 +31,13 @@ _LENGTH = 11.0  # s
 _JUMP_LENGTH = 4.5
 _RUN_COMMANDS, _RUN_LENGTH = "1,0,0@0.5 2,0,0@3 2,0,0.3@8 0,0,0@11", 16.0
 _RUN_POSES = tuple(7.5 + 0.06 * number for number in range(12))  # s
-_SETTLED = 2.0  # s, from which on speeds are compared
+_COMPARED_SINCE = 2.0  # s, from which on speeds are compared
 _WALKS: Mapping[str, Mapping[str, object]] = {
     "walk": {"behaviour": "state_machine", "machine": "walk"},
     "planner": {"planner": "predictive"},
 }
 _PUSH_COMMANDS, _PUSH_TIME, _PUSH_END = "0.6,0,0@0.2", 3.0, 6.5
-_USUAL, _FINE = (4, 4), (12, 6)  # directions, and runs for each direction
+_USUAL_RUNS, _FINE_RUNS = (4, 4), (12, 6)  # directions, and runs for each direction
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
@@ -53,7 +53,7 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     title = "the same commands: the machine `walk`, and the planner that follows warped clips"
     draw_courses(result, result.name, title, runs, wanted)
     draw_jump(result, jump.recording)
-    directions, halvings = _FINE if runner.fine else _USUAL
+    directions, halvings = _FINE_RUNS if runner.fine else _USUAL_RUNS
     names = list(walks) if runner.fine else ["walk"]
     maps = {name: _pushed(runner, name, directions, halvings) for name in names}
     draw_pushes(result, maps)
@@ -94,10 +94,11 @@ def _steered(name: str) -> RunSpec:
     return _case(name, _LENGTH, _WALKS[name], _COMMANDS)
 
 
-def _row(name: str, run_: Recording, wanted: Course | None) -> dict[str, object]:
+def _row(name: str, run_: Recording, wanted: CourseSeries | None) -> dict[str, object]:
     speed = heading = None
     if wanted is not None:
-        course, settled = taken(run_), slice(int(np.searchsorted(run_.times, _SETTLED)), None)
+        course = taken(run_)
+        settled = slice(int(np.searchsorted(run_.times, _COMPARED_SINCE)), None)
         rows = slice(settled.start, len(run_.times))
         speed = float(np.abs(course.speed[rows] - wanted.speed[rows]).mean())
         heading = float(np.abs(course.heading[rows] - wanted.heading[rows]).mean())
@@ -107,7 +108,7 @@ def _row(name: str, run_: Recording, wanted: Course | None) -> dict[str, object]
         "speed error (m/s)": speed,
         "heading error (rad)": heading,
         "longest flight (s)": longest_flight(run_)[1],
-        "states": len({span.facts.get("state") for span in mode_spans(run_)} - {None}),
+        "states": len({span.facts.get("state") for span in mode_events(run_)} - {None}),
     }
 
 

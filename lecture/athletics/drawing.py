@@ -8,10 +8,10 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.render.plots import label
 from actuated_characters.render.stills import strip
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import mode_events
 from lecture.athletics.measures import (
     FEET,
-    Course,
+    CourseSeries,
     loaded,
     longest_flight,
     taken,
@@ -26,7 +26,7 @@ _JUMP_POSES = (0.9, 1.55, 1.7, 1.85, 2.0, 2.1, 2.5, 3.5)  # s
 
 
 def draw_courses(
-    result: StudyResult, name: str, title: str, runs: Mapping[str, Recording], wanted: Course
+    result: StudyResult, name: str, title: str, runs: Mapping[str, Recording], wanted: CourseSeries
 ) -> None:
     """A column a run of the same commands: which foot stands, speed, heading."""
     panels = result.add_panels(name, 3, len(runs), (12.0, 7.0), title=title, same_x=True)
@@ -55,7 +55,7 @@ def _draw_feet(panel: "Axes", recording: Recording) -> None:
         edges = np.flatnonzero(np.diff(np.r_[0, rows[:, column], 0])).reshape(-1, 2)
         bars = [(float(times[a]), float(times[b] - times[a])) for a, b in edges]
         panel.broken_barh(bars, (column + 0.6, 0.8), color=f"C{column}")
-    spans = [span for span in mode_spans(recording) if "state" in span.facts]
+    spans = [span for span in mode_events(recording) if "state" in span.facts]
     names = sorted({str(span.facts["state"]) for span in spans})
     for span in spans:
         color = f"C{2 + names.index(str(span.facts['state'])) % 8}"

@@ -15,33 +15,33 @@ _WINDOW = 0.5  # s, over which speed and heading are averaged: more than a step
 
 
 @dataclass(frozen=True)
-class Course:
+class CourseSeries:
     """A course over the ground at each state, (t + 1,)."""
 
     speed: FloatArray  # m/s, ahead
     heading: FloatArray  # rad, of the way that the root faces
 
 
-def commanded(case: RunSpec) -> Course:
+def commanded(case: RunSpec) -> CourseSeries:
     """The course that a case is told to take."""
     plan, _ = case.plan()
     reference = plan.reference
     assert isinstance(reference, SteeredReference)
     courses = [reference.course(tick) for tick in range(plan.ticks + 1)]
-    return Course(
+    return CourseSeries(
         np.array([course.forward for course in courses]),
         np.array([course.heading for course in courses]),
     )
 
 
-def taken(recording: Recording) -> Course:
+def taken(recording: Recording) -> CourseSeries:
     """The course that a humanoid takes: means over half a second, of the root."""
     facing = rotations.rotate(rotations.exp(recording.position[:, 3:6]), np.array((1.0, 0.0, 0.0)))
     heading = np.unwrap(np.arctan2(facing[:, 1], facing[:, 0]))
     x, y = recording.velocity[:, 0], recording.velocity[:, 1]
     speed = np.cos(heading) * x + np.sin(heading) * y
     rate = (len(recording.times) - 1) / float(recording.times[-1])
-    return Course(_smooth(speed, rate), _smooth(heading, rate))
+    return CourseSeries(_smooth(speed, rate), _smooth(heading, rate))
 
 
 def _smooth(values: FloatArray, rate: float) -> FloatArray:

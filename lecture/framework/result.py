@@ -32,7 +32,7 @@ class StudyResult:
         """`name` is the study's; the table and the pictures without another name have it."""
         self.name = name
         self.rows: list[Row] = []  # rows of the table; each has the same columns
-        self.figures: dict[str, Figure] = {}  # by the name of their files
+        self.figures: dict[str, Figure] = {}  # figures by the names of their files
         # by the name of a CSV file: columns (t,) by their names
         self.curves: dict[str, Mapping[str, FloatArray]] = {}
         self.remarks: list[str] = []  # sentences about the result

@@ -24,7 +24,7 @@ class Load:
 
     force: Vector = _ZERO  # N, world
     torque: Vector = _ZERO  # N m, world
-    point: Vector = _ZERO  # where the force acts: m from the centre of mass, body axes
+    point: Vector = _ZERO  # the force acts here: m from the centre of mass, body axes
 
 
 @dataclass(frozen=True)

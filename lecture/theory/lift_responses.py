@@ -17,7 +17,7 @@ _TAIL = RATE // 2  # states that a steady state is the mean of, where nothing sw
 
 
 @dataclass(frozen=True)
-class LawGains:
+class LiftLaw:
     """A law and its gains, and the theory of both."""
 
     law: str
@@ -26,7 +26,7 @@ class LawGains:
     integral: float = 0.0  # N/(m s)
 
     @classmethod
-    def critical(cls, law: str, stiffness: float) -> "LawGains":
+    def critical(cls, law: str, stiffness: float) -> "LiftLaw":
         """Critically damped, in continuous time."""
         return cls(law, stiffness, second_order.critical_damping(stiffness, MASS))
 
@@ -59,7 +59,7 @@ class LawGains:
 class Response:
     """A motion of the mass, from rest at 0 m towards the target, and its measures."""
 
-    gains: LawGains
+    gains: LiftLaw
     times: FloatArray  # (t,) s
     height: FloatArray  # (t,) m
     diverged: bool
@@ -91,7 +91,7 @@ class Bound:
 
     law: str
     theory: float  # N/m
-    evaluated: tuple[Response, ...]  # in rising order of stiffness
+    evaluated: tuple[Response, ...]  # responses in rising order of stiffness
 
     @property
     def below(self) -> Response:
@@ -109,13 +109,13 @@ class Bound:
         return math.sqrt(self.below.gains.stiffness * self.above.gains.stiffness)
 
 
-def find_bound(respond: Callable[[LawGains], Response], law: str, theory: float) -> Bound:
+def find_bound(respond: Callable[[LiftLaw], Response], law: str, theory: float) -> Bound:
     """Bisect for the bound of a law between stiffnesses (N/m) around that of theory."""
     low, high = (share * theory for share in _BRACKET)
-    evaluated = [respond(LawGains.critical(law, stiffness)) for stiffness in (low, high)]
+    evaluated = [respond(LiftLaw.critical(law, stiffness)) for stiffness in (low, high)]
     while high / low > _RESOLUTION:
         middle = math.sqrt(low * high)
-        evaluated.append(respond(LawGains.critical(law, middle)))
+        evaluated.append(respond(LiftLaw.critical(law, middle)))
         low, high = (middle, high) if evaluated[-1].stable else (low, middle)
     evaluated.sort(key=lambda response: response.gains.stiffness)
     return Bound(law, theory, tuple(evaluated))

@@ -13,7 +13,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 
-_SETTLED = 0.02  # share of the way: the usual band of the settling time
+_SETTLING_BAND = 0.02  # share of the way: the usual band of the settling time
 
 
 def critical_damping(stiffness: float, mass: float) -> float:
@@ -74,7 +74,7 @@ class Oscillation:
 
     damping_ratio: float
     frequency: float  # undamped, rad/s
-    rest: float  # where it comes to rest, or what it swings about, m
+    rest: float  # height at which it comes to rest, or about which it swings, m
 
 
 def identify(track: FloatArray, period: float) -> Oscillation:
@@ -101,7 +101,7 @@ def measured_overshoot(track: FloatArray, rest: float) -> float:
 
 def settling_time(times: FloatArray, track: FloatArray, rest: float) -> float | None:
     """Time in s from which a track (t,) stays within 2 % of its way; None if it never does."""
-    outside = np.flatnonzero(np.abs(track - rest) > _SETTLED * abs(rest - track[0]))
+    outside = np.flatnonzero(np.abs(track - rest) > _SETTLING_BAND * abs(rest - track[0]))
     if not len(outside):
         return 0.0
     after = int(outside[-1]) + 1

@@ -23,7 +23,7 @@ from msgs_config.bus.ros_parameters import declare, given_parameters, plain_valu
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, Values
 
-_UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
+_UNKNOWN_NODE = "_UNKNOWN_"  # ROS says this of a node whose name has not come yet
 
 
 def create_publisher(node: Node, topic: Topic) -> "DdsPublisher":
@@ -125,7 +125,7 @@ class DdsNode(Node):
             gid = ".".join(f"{byte:02x}" for byte in info.endpoint_gid)
             compatibility, reason = qos_check_compatible(info.qos_profile, topic.qos)
             misfit = reason.strip() if compatibility == QoSCompatibility.ERROR else ""
-            name = "" if _UNKNOWN in name else name
+            name = "" if _UNKNOWN_NODE in name else name
             found.append(Endpoint(name, gid, info.topic_type, misfit))
         return found
 

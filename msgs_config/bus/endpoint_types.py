@@ -9,7 +9,7 @@ from rclpy.node import Node
 from msgs_config.bus.once_logger import OnceLogger
 
 _PERIOD = 1.0  # s between looks at the graph
-_UNKNOWN = "_UNKNOWN_"  # in what ROS says of a node whose name has not come yet
+_UNKNOWN_NODE = "_UNKNOWN_"  # ROS says this of a node whose name has not come yet
 
 
 class OtherType(NamedTuple):
@@ -48,7 +48,7 @@ class EndpointTypes:
         self._counts: dict[tuple[str, bool], int] = {}  # endpoints when last looked at
         self._next_look = 0.0
 
-    def look(self) -> None:
+    def look_at_graph(self) -> None:
         """Look at the graph if it is time; cheap as long as no endpoint comes or goes."""
         now = time.monotonic()
         if now < self._next_look:
@@ -71,7 +71,7 @@ class EndpointTypes:
         """Log what is wrong; whether all is known, or else to be looked at again."""
         does, result = ("published", "never heard") if is_input else ("read", "never sent")
         for other in others:
-            if _UNKNOWN in other.node:
+            if _UNKNOWN_NODE in other.node:
                 return False
             self._once_logger.log_once(
                 f"'{topic}' is {does} by {other.node} as {other.type_name}, which is {result}: "

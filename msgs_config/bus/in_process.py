@@ -126,7 +126,7 @@ class InProcessSubscription:
         self._pending.append(raw)
         if len(self._pending) > self._most:
             self._pending.popleft()
-            if self._most > 1 and not self._has_dropped:  # with a depth of 1 the newest is all
+            if self._most > 1 and not self._has_dropped:  # a depth of 1 keeps the newest alone
                 self._has_dropped = True
                 self._log.warning(
                     f"'{self._name}': more than {self._most} messages wait to be taken; the "
@@ -298,7 +298,7 @@ class InProcessNode:
             if not self._declared[name].when_changed:
                 return f"parameter '{name}' cannot be changed"
             expected, found = type(self._declared[name].default), type(values[name])
-            if found is not expected:  # as over DDS, also where one could stand for the other
+            if found is not expected:  # DDS refuses it where one could stand for the other, too
                 return f"parameter '{name}' is of type {found.__name__}, not {expected.__name__}"
         reason = self._refusal(dict(values))
         if not reason:

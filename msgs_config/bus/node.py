@@ -7,10 +7,13 @@ names.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from msgs_config.messages.topic import Topic
-from msgs_config.parameters import Parameter, Values
+from msgs_config.parameters import Parameter, Values, resolve
+from msgs_config.settings import Settings
+
+_Settings = TypeVar("_Settings", bound=Settings)
 
 
 class Received(NamedTuple):
@@ -18,7 +21,7 @@ class Received(NamedTuple):
 
     raw: bytes
     published_ns: int  # wall time
-    number: int | None  # that its publisher gave it, from 1 on; None where the bus has none
+    number: int | None  # its publisher's count, from 1 on; None where the bus has none
 
 
 class Publisher(Protocol):
@@ -214,3 +217,15 @@ class BusNode(Protocol):
 
     def destroy_node(self) -> object:
         """Leave the bus."""
+
+
+def declared_settings(node: BusNode, kind: type[_Settings]) -> _Settings:
+    """A node's settings as a user has set them; declares their parameters, which are all it has.
+
+    Raises:
+        ConfigurationError: a value is wrong, or a name is none of the parameters'.
+    """
+    parameters = kind.declared()
+    values = resolve(parameters, node.given_parameters())
+    node.declare(parameters, values)
+    return kind.of(values)

@@ -21,7 +21,7 @@ from msgs_config.messages.topic import Topic
 _SERVICE_PERIOD = 0.02  # s between turns of the executor in a busy loop
 _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
 _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
-_MOST_TURNS = 50  # of the executor in a row, which has one callback a turn
+_MOST_TURNS = 50  # turns of the executor in a row, with one callback each
 _MOST_DISCARDED = 20_000  # messages, more than can wait
 _BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
 
@@ -142,7 +142,7 @@ class PollingExecutor:
 
     def _look_at_types(self) -> None:
         for each in self._types:
-            each.look()
+            each.look_at_graph()
 
     def serve_pending(self) -> None:
         """Do all that is ready: a flood of messages must not keep services waiting."""

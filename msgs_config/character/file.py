@@ -8,14 +8,15 @@ from typing import Any
 from msgs_config import files
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
-from msgs_config.character.urdf.formats import (
+from msgs_config.character.urdf.file_formats.formats import (
+    CHARACTER_FILE,
     URDF_SUFFIXES,
     YAML_SUFFIXES,
-    check_suffix,
     is_urdf,
 )
 from msgs_config.character.urdf_settings import URDF_KEYS, read_urdf_settings, resolve_key
 from msgs_config.errors import CharacterError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.mappings import LARGEST, MappingReader
 
 CHARACTERS_DIRECTORY = Path(__file__).parent / "data"
@@ -90,7 +91,8 @@ def character_path(name_or_path: str) -> Path:
     elif name_or_path in shipped_characters():
         path = CHARACTERS_DIRECTORY / f"{name_or_path}.yaml"
     else:
-        check_suffix(Path(name_or_path))
+        kinds = (*YAML_SUFFIXES, *URDF_SUFFIXES)
+        refuse_other_kind(Path(name_or_path), CHARACTER_FILE, kinds, CharacterError)
         sentence = one_of("character", name_or_path, shipped_characters())
         raise CharacterError(f"{sentence}, or the path of a .yaml, .urdf or .xacro file")
     return path

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.automatic_gains import automatic_gains, describe_weak_joints
 from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.character.file import CharacterFile
+from msgs_config.character.joints.automatic_gains import automatic_gains, describe_weak_joints
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character
 

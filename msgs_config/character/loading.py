@@ -17,7 +17,7 @@ import numpy as np
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
-from msgs_config.character.followers import add_mimics, check_followers, couple_rest_pose
+from msgs_config.character.joints.followers import add_mimics, check_followers, couple_rest_pose
 from msgs_config.character.layout import ROOT, SCALAR, JointLayout, JointType
 from msgs_config.character.link_order import sort_depth_first
 from msgs_config.character.meshes.resolving import resolve_meshes

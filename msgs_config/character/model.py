@@ -15,12 +15,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.coupling import Coupling
+from msgs_config.character.joints.coupling import Coupling
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.sensors import Sensor
+from msgs_config.character.urdf.file_formats.vocabulary import LeftOut
 from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.character.urdf.reading import ReadUrdf, read_robot
-from msgs_config.character.urdf.vocabulary import LeftOut
 from msgs_config.errors import LayoutError
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.rotations import IDENTITY_XYZW
@@ -115,8 +115,8 @@ class Joint:
     effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
     damping: float = 0.0  # passive; N m s/rad or N s/m
     friction: float = 0.0  # passive, of a hinge or slider; the most that it has, N m or N
-    mimic: Mimic | None = None  # of a hinge or slider that follows another, which follows none
-    soft_limit: SoftLimit | None = None  # of a ball joint
+    mimic: Mimic | None = None  # says what a hinge or slider follows, which follows none itself
+    soft_limit: SoftLimit | None = None  # a ball joint may have one
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ class Link:
     joint: Joint
     mass: float
     inertia_diagonal: Vector  # kg m^2, in the inertial frame
-    inertial_pose: Pose  # in the link frame
-    shapes: tuple[Shape, ...] = ()  # that are seen
+    inertial_pose: Pose  # pose of the principal axes in the link frame
+    shapes: tuple[Shape, ...] = ()  # the shapes that are seen
     collision_shapes: tuple[Shape, ...] = ()
 
     def inertia_in_link_axes(self) -> FloatArray:
@@ -188,7 +188,7 @@ class Frame:
     name: str
     parent: str  # a link, or another frame
     joint: str  # the URDF's, between the two
-    pose: Pose  # in the parent
+    pose: Pose  # pose in the parent
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ class UrdfOptions:
     fixed_base: bool = False
     inertia_from_file: bool = False
     self_collision: bool = False
-    fill_inertia: bool = False  # of links that have a mass but no inertia, see `repair_urdf`
+    fill_inertia: bool = False  # fills that of links with a mass but no inertia, see `repair_urdf`
     collisions: bool = True  # false: nothing of it collides, and meshes may be missing
     mimics: bool = True  # false: joints that mimic others are joints as any
 
@@ -256,7 +256,7 @@ class Character:
     clips: ClipFormat
     feet: tuple[str, ...] = ()  # the links that it stands on
     planning: Planning = Planning()
-    warnings: tuple[str, ...] = ()  # of likely mistakes in its files
+    warnings: tuple[str, ...] = ()  # tell of likely mistakes in its files
     placement: Placement = Placement()
     sensors: tuple[Sensor, ...] = ()
     up_axis: str = "z"

@@ -13,9 +13,9 @@ from msgs_config.mappings import MappingReader
 
 _ZERO: scalars.Vector = (0.0, 0.0, 0.0)
 _WORLD = "world"  # a frame that is there for every character
-_FARTHEST = 1e3  # m from the link's origin
+_MAX_OFFSET = 1e3  # m from the link's origin
 _LARGEST_ANGLE = 2.0 * math.pi  # rad; degrees are mostly more
-_LARGEST_NOISE = 1e9  # in any unit; its square is a number, too
+_LARGEST_NOISE = 1e9  # its square is a number as well, in any unit
 _MOST_LETTERS = 64
 _SENSOR_KEYS = ("link", "xyz", "rpy", "noise")
 _NOISE_KEYS = ("stddev", "bias", "bias_stddev", "bias_walk")
@@ -43,10 +43,10 @@ _QUANTITIES = {
 class Noise:
     """What is added to a measured vector, per axis of the sensor, in the vector's unit."""
 
-    stddev: scalars.Vector = _ZERO  # of white noise, drawn at each tick
+    stddev: scalars.Vector = _ZERO  # white noise's, drawn at each tick
     bias: scalars.Vector = _ZERO  # constant
-    bias_stddev: scalars.Vector = _ZERO  # of a constant bias, drawn once from the seed
-    bias_walk: scalars.Vector = _ZERO  # of a bias that walks, after 1 s; it grows with time's root
+    bias_stddev: scalars.Vector = _ZERO  # a constant bias', drawn once from the seed
+    bias_walk: scalars.Vector = _ZERO  # a walking bias', after 1 s; it grows with time's root
 
     def __bool__(self) -> bool:
         return self != Noise()
@@ -118,7 +118,7 @@ def _read_type(reader: MappingReader, sensor_type: SensorType) -> Iterator[Senso
             name,
             sensor_type,
             each.text("link"),
-            _vector(each.numbers("xyz", 3, (-_FARTHEST, _FARTHEST), [0.0] * 3)),
+            _vector(each.numbers("xyz", 3, (-_MAX_OFFSET, _MAX_OFFSET), [0.0] * 3)),
             scalars.of_roll_pitch_yaw(
                 each.numbers("rpy", 3, (-_LARGEST_ANGLE, _LARGEST_ANGLE), [0.0] * 3)
             ),

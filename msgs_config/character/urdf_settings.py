@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from msgs_config import files
-from msgs_config.character.joint_bounds import write_bounds
+from msgs_config.character.joints.joint_bounds import write_bounds
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
+from msgs_config.character.urdf.file_formats.source import read_urdf_text
 from msgs_config.character.urdf.frames import has_massless_base
-from msgs_config.character.urdf.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.mappings import MappingReader
 

@@ -18,12 +18,12 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.errors import ClipError, one_of
+from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.files import read_text
 from msgs_config.geometry import fixed_order, rotations
-from msgs_config.motion_formats import describe_no_clip
 
 _SUFFIXES = (".txt", ".json")
-_BEGINNING = 256  # bytes of a file, in which a JSON object begins
+_BEGINNING_BYTES = 256  # bytes of a file, in which a JSON object begins
 _ROOT_COLUMNS = 8  # 1 for the duration, 3 for the position, 4 for the quaternion
 _SHORTEST_QUATERNION = 0.1
 _LARGEST_NUMBER = 1e6  # m or s
@@ -101,12 +101,9 @@ def read_clip(character: Character, name_or_path: str) -> ClipFrames:
 def clip_path(character: Character, name_or_path: str) -> Path:
     """The file of a clip given by name or path. Raises ClipError if there is no such clip."""
     path = Path(name_or_path)
-    is_file = path.suffix.lower() in _SUFFIXES
-    other = "" if is_file else describe_no_clip(path)
-    if other:
-        raise ClipError(f"{path}: not a clip but {other}")
-    if is_file:
+    if path.suffix.lower() in _SUFFIXES:
         return path
+    refuse_other_kind(path, "a clip", _SUFFIXES, ClipError)
     if not character.clips.pattern:
         raise ClipError(
             f"character '{character.name}' has no clips by name: its file has no key 'clips'; give "
@@ -149,7 +146,7 @@ def is_note(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            return not file.read(_BEGINNING).lstrip().startswith(b"{")
+            return not file.read(_BEGINNING_BYTES).lstrip().startswith(b"{")
     except OSError:
         return False  # reading it as a clip tells why
 

@@ -12,7 +12,7 @@ from msgs_config.arrays import FloatArray
 
 _FEW_ADDENDS = 8  # addends, up to which whole columns are added: `accumulate` would go row by row
 
-_NEXT, _AFTER_NEXT = np.array((1, 2, 0)), np.array((2, 0, 1))  # of three axes, in a cycle
+_NEXT_AXIS, _AXIS_AFTER_NEXT = np.array((1, 2, 0)), np.array((2, 0, 1))  # the axes' cycle
 
 
 def total(values: FloatArray, axis: int = -1) -> FloatArray:
@@ -58,8 +58,8 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Vector products `a x b` (..., 3) of vectors (..., 3), broadcast against each other."""
-    crossed: FloatArray = a.take(_NEXT, axis=-1) * b.take(_AFTER_NEXT, axis=-1)
-    crossed -= a.take(_AFTER_NEXT, axis=-1) * b.take(_NEXT, axis=-1)
+    crossed: FloatArray = a.take(_NEXT_AXIS, axis=-1) * b.take(_AXIS_AFTER_NEXT, axis=-1)
+    crossed -= a.take(_AXIS_AFTER_NEXT, axis=-1) * b.take(_NEXT_AXIS, axis=-1)
     return crossed
 
 

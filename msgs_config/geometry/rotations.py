@@ -12,11 +12,10 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import elementary, fixed_order
 
 IDENTITY_XYZW = (0.0, 0.0, 0.0, 1.0)
-_TINY_DIVISOR = (
-    1e-150  # keeps 0 / 0 away; the product with a vector of length zero is zero all the same
-)
+# It keeps 0 / 0 away; the product with a vector of length zero is zero all the same.
+_TINY_DIVISOR = 1e-150
 
-_SMALL = 1e-2  # rad
+_SMALL_ANGLE = 1e-2  # rad
 _SERIES_END = 10.0  # rad^2, just over half a turn, where 15 terms give all digits
 
 _CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
@@ -103,14 +102,14 @@ def right_jacobian_inverse(rotation_vector: FloatArray) -> FloatArray:
     Source: Solà, Deray and Atchuthan 2018, equation 144.
     """
     angle = _length(rotation_vector)[..., np.newaxis]
-    half = np.maximum(0.5 * angle, 0.5 * _SMALL)
+    half = np.maximum(0.5 * angle, 0.5 * _SMALL_ANGLE)
     closed = (1.0 - half / elementary.tan(half)) / (4.0 * half * half)
-    series = 1.0 / 12.0 + angle * angle / 720.0  # where the closed form would lose its digits
+    series = 1.0 / 12.0 + angle * angle / 720.0  # here the closed form would lose its digits
     cross = _cross_matrix(rotation_vector)
     inverse: FloatArray = (
         np.eye(3)
         + 0.5 * cross
-        + np.where(angle < _SMALL, series, closed) * fixed_order.product(cross, cross)
+        + np.where(angle < _SMALL_ANGLE, series, closed) * fixed_order.product(cross, cross)
     )
     return inverse
 

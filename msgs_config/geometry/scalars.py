@@ -135,7 +135,7 @@ def right_jacobian_inverse(rotation_vector: Sequence[float]) -> Axes:
     square = xx + yy + zz
     half = 0.5 * math.sqrt(square)
     if half < _SMALL_HALF:
-        c = 1.0 / 12.0 + square / 720.0  # where the closed form would lose its digits
+        c = 1.0 / 12.0 + square / 720.0  # here the closed form would lose its digits
     else:
         c = (1.0 - half / math.tan(half)) / square
     hx, hy, hz = 0.5 * x, 0.5 * y, 0.5 * z

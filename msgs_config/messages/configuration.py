@@ -90,7 +90,7 @@ class RunConfiguration:
     mass: float  # kg
     parameters: dict[str, Any]
     probe: DynamicsSample | None = None  # absent from other simulators
-    versions: dict[str, str] = field(default_factory=dict)  # of the packages that it runs with
+    versions: dict[str, str] = field(default_factory=dict)  # versions of packages by their names
     session: str = ANONYMOUS
 
 
@@ -135,11 +135,11 @@ class WorldCopy:
     """The files that a simulator has read, and the character's place in its world."""
 
     character_path: Path
-    character_text: str = field(repr=False)  # of its YAML file; empty for a URDF alone
+    character_text: str = field(repr=False)  # its YAML file's text; empty for a URDF alone
     urdf: UrdfCopy
     terrain: UrdfCopy | None
     name: str  # the character's, where it is one of several; else empty
-    characters: tuple[str, ...]  # in the order in which they entered the world; empty for one
+    characters: tuple[str, ...]  # names in the order of entering the world; empty for one character
 
 
 def parse_world(text: str) -> WorldCopy:

@@ -48,7 +48,7 @@ class JointStateEncoder:
 
     def __init__(self, names: Sequence[str], frame_id: str = "") -> None:
         self._head = encode_head(names, frame_id)
-        self._lengths: tuple[int, ...] = ()  # of the last message's lists
+        self._lengths: tuple[int, ...] = ()  # lengths of the last message's lists
 
     def encode(
         self,

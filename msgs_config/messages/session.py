@@ -11,14 +11,28 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Parameter, Values
+from msgs_config.settings import Settings, parameter
 
-SESSION = Parameter(
-    "session",
-    "",
-    "id of the one simulator that this node is or belongs to, NAME#DIGITS; empty: sim_node makes "
-    "one, and others bind to the first simulator whose states they can use",
-)
+
+class GivenSession(Settings):
+    """The session that a node is given. Raises ConfigurationError if it is no session id."""
+
+    id: str = parameter(
+        "",
+        "id of the one simulator that this node is or belongs to, NAME#DIGITS; empty: sim_node "
+        "makes one, and others bind to the first simulator whose states they can use",
+        name="session",
+    )
+
+    def __post_init__(self) -> None:
+        if self.id and not is_session(self.id):
+            raise ConfigurationError(
+                f"parameter 'session' is {self.id!r}; it must be a node's full name, '#' and "
+                "letters or digits, such as /sim_node#3fa29c01b7de, or empty"
+            )
+
+
+(SESSION,) = GivenSession.declared()
 ANONYMOUS = ""
 """The session of all messages that name none."""
 
@@ -38,21 +52,6 @@ _MOST_NAMED = 8  # foreign sessions
 def make_session(node_name: str) -> str:
     """A new id for a simulator whose node has this full name. It influences no state."""
     return f"{node_name}{_MARK}{secrets.token_hex(6)}"
-
-
-def given_session(values: Values) -> str:
-    """The value of the parameter `session`, empty if none was given.
-
-    Raises:
-        ConfigurationError: it is no session id.
-    """
-    text = values.text(SESSION.name)
-    if text and not is_session(text):
-        raise ConfigurationError(
-            f"parameter '{SESSION.name}' is {text!r}; it must be a node's full name, '#' and "
-            "letters or digits, such as /sim_node#3fa29c01b7de, or empty"
-        )
-    return text
 
 
 def is_session(text: str) -> bool:
@@ -102,7 +101,7 @@ class SessionBinding:
         self._silence: float | None = None  # s; None before another session speaks
         self._looked_at: float | None = None
 
-    def look(self, now: float) -> None:
+    def note_look(self, now: float) -> None:
         """Note, at every turn, that the receiver looks for messages; `now` in s."""
         if self._looked_at is not None and self._silence is not None:
             self._silence += min(max(now - self._looked_at, 0.0), _LONGEST_LOOK)

@@ -19,7 +19,7 @@ NUMBERS = (MASS, RADIUS, *POSITION, *VELOCITY)
 DENSITY = 500.0  # kg/m^3, of a ball whose radius is not given: a light wood
 _BOUNDS = {MASS: (1e-3, 1e4), RADIUS: (5e-3, 5.0)}
 _MAX_SPEED = 1000.0  # m/s
-_FARTHEST = 1e6  # m
+_MAX_COORDINATE = 1e6  # m
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class ProjectileThrow:
         speed = float(fixed_order.norm(np.array(self.velocity)))
         if speed > _MAX_SPEED:
             raise CommandError(f"its speed is {speed:g} m/s; it must be at most {_MAX_SPEED:g} m/s")
-        if max(map(abs, self.position)) > _FARTHEST:
+        if max(map(abs, self.position)) > _MAX_COORDINATE:
             raise CommandError(
-                f"its place is {self.position}; no coordinate may be beyond {_FARTHEST:g} m"
+                f"its place is {self.position}; no coordinate may be beyond {_MAX_COORDINATE:g} m"
             )
 
     def numbers(self) -> FloatArray:

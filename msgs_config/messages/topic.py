@@ -24,7 +24,7 @@ class Quality:
     """A quality of service that keeps the last messages."""
 
     depth: int
-    is_latched: bool = False  # those who come late get the last messages, too
+    is_latched: bool = False  # whether late subscribers get the last messages
     is_reliable: bool = True
 
     @property
@@ -59,7 +59,7 @@ class Kept(Enum):
     """Whether the recorder records a topic."""
 
     NEVER = auto()
-    IF_NAMED = auto()  # where a parameter names it
+    IF_NAMED = auto()  # it is kept if a parameter names it
     UNLESS_EXCLUDED = auto()
     ALWAYS = auto()  # nothing can be measured or repeated without
 
@@ -70,8 +70,8 @@ class SessionPlace(Enum):
     NOWHERE = auto()
     FRAME_ID = auto()
     FRAME_ID_IF_ANY = auto()  # without a name it is for any simulator
-    EPISODE = auto()  # in `frame_id`, behind the episode's number
-    CONFIGURATION = auto()  # in its JSON
+    EPISODE = auto()  # it stands in `frame_id`, behind the episode's number
+    CONFIGURATION = auto()  # it stands in the configuration's JSON
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class Topic:
     """A topic of the contract. A name that begins with `~` is below its node's name."""
 
     name: str
-    type_name: str  # as ROS has it: PACKAGE/msg/TYPE
+    type_name: str  # ROS' name of the type: PACKAGE/msg/TYPE
     quality: Quality
-    way: str = ""  # from whom to whom, for the documentation
-    nodes: tuple[str, ...] = ()  # whose name `~` stands for
+    way: str = ""  # says from whom to whom it goes, for the documentation
+    nodes: tuple[str, ...] = ()  # the nodes whose name `~` stands for
     of_world: bool = False  # one of all characters in a world together, not one of each
     kept: Kept = Kept.UNLESS_EXCLUDED
     session: SessionPlace = SessionPlace.NOWHERE
@@ -90,8 +90,8 @@ class Topic:
     is_read: bool = False  # whether `Recording` has it
     # whether the simulator sends one at each tick, which begins with its stamp: players send it too
     is_of_tick: bool = False
-    accepted_on: str = ""  # of a request to a node: its topic with what it has accepted
-    content: str = ""  # for the documentation
+    accepted_on: str = ""  # the topic on which a node says which requests it has accepted
+    content: str = ""  # says what it has, for the documentation
 
     @property
     def message_type(self) -> type:

@@ -414,6 +414,29 @@ CONTROLLER_CONFIGURATION = Topic(
     is_read=True,
     content="the same of the controller; again at each change of its parameters",
 )
+_KEYFRAME = Topic(
+    "~/keyframe",
+    "sensor_msgs/msg/CompressedImage",
+    DISPLAY,
+    session=SessionPlace.FRAME_ID,
+    is_read=True,
+)
+KEYFRAME = replace(
+    _KEYFRAME,
+    way="sim_node → all",
+    nodes=(SIM_NODE,),
+    of_world=True,
+    content=(
+        "no picture, but all that the simulator goes on from in the stamp's state, compressed: "
+        "every `keyframe_period`, but while a push acts; a fork begins there"
+    ),
+)
+CONTROLLER_KEYFRAME = replace(
+    _KEYFRAME,
+    way="controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content="the same of the controller, before it answers the stamp's state",
+)
 DIAGNOSTICS = Topic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
@@ -442,7 +465,9 @@ APPLIED_WRENCH_THROTTLE = APPLIED_WRENCH.throttled
 THROWN_THROTTLE = THROWN.throttled
 REFERENCE_THROTTLE = REFERENCE.throttled
 
-TABLE = tuple(topic for topic in list(globals().values()) if isinstance(topic, Topic))
+TABLE = tuple(
+    value for name, value in list(globals().items()) if isinstance(value, Topic) and name[0] != "_"
+)
 """All topics, in the order of the documentation."""
 
 

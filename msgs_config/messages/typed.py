@@ -24,7 +24,7 @@ _READERS = {
     b"\0\0": attrgetter("deserialize_cdr_be"),
     b"\0\1": attrgetter("deserialize_cdr_le"),
 }
-_QUATERNION = "geometry_msgs/msg/Quaternion"  # of the contract's types alone has a default but zero
+_QUATERNION = "geometry_msgs/msg/Quaternion"  # its default is not zero
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 

@@ -35,7 +35,7 @@ class WrenchArrays:
     links: tuple[str, ...]  # (m,)
     wrenches: FloatArray  # (m, 6): force N, torque N m; world axes
     points: FloatArray  # (m, 3) in m, link frames; or (0, 3)
-    frame_id: str = WORLD  # WORLD, or the session that sent them
+    frame_id: str = WORLD  # the frame, or the session that sent them
 
     @classmethod
     def of_rows(
@@ -77,7 +77,7 @@ class SelectionEncoder:
         """The names of all links, in the order of the arrays' rows."""
         self._names = names
         self._frame_id = frame_id
-        self._heads: dict[bytes, bytes] = {}  # by which links are chosen
+        self._heads: dict[bytes, bytes] = {}  # heads by the bytes that choose links
 
     def encode(self, stamp_ns: int, wrenches: FloatArray, chosen: BoolArray) -> bytes:
         """The serialised message of those wrenches (links, 6) of which `chosen` (links,) is true.

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-_KEPT = 1 << 15
+_MAX_DURATIONS = 1 << 15
 
 
 class Durations:
@@ -18,10 +18,10 @@ class Durations:
 
     def add(self, duration: float) -> None:
         """Keep a duration in s, in place of the oldest once the ring is full."""
-        if len(self._ring) < _KEPT:
+        if len(self._ring) < _MAX_DURATIONS:
             self._ring.append(duration)
         else:
-            self._ring[self._count % _KEPT] = duration
+            self._ring[self._count % _MAX_DURATIONS] = duration
         self._count += 1
 
     def mean(self) -> float | None:

@@ -40,7 +40,7 @@ _HIDDEN_WARNING = (
 )
 _PARAMETERS_ARE_SET = (
     "parameters are set by --ros-args -p NAME:=VALUE or --params-file FILE, and listed by "
-    "'actuated_characters parameters'"
+    "'actuated_characters run --parameters NODE'"
 )
 _USAGE = "usage: {name} [--ros-args ...]\n\n{about}" + _PARAMETERS_ARE_SET
 

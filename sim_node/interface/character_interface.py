@@ -12,7 +12,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.wrenches import decode_wrenches
-from sim_node.interface.publishers import Publishers
+from sim_node.interface.publishers import CharacterPublishers
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
@@ -44,7 +44,7 @@ class CharacterInterface:
         self._of = f" for '{self.name}'" if self.name else ""
         self._own_session = own_session
         self._once_logger = logger
-        self.publishers = Publishers(node, character, settings, own_session.session)
+        self.publishers = CharacterPublishers(node, character, settings, own_session.session)
         self.commands: LockstepBarrier | ZeroOrderHold
         names, commanded = character.layout.dof_names, character.commanded
         leaders = character.character.leaders

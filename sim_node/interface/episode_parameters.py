@@ -11,8 +11,8 @@ from sim_node.initial_state import (
     INITIAL_STATE,
     POSITION,
     VELOCITY,
+    CharacterSettings,
     as_values,
-    begins_with_reference,
     changed_start,
 )
 from sim_node.parameters import SimulatorParameters
@@ -60,7 +60,7 @@ class EpisodeParameters:
         states = {
             each.name: states[each.name]
             for each in after.characters
-            if each.name in states and begins_with_reference(each.values)
+            if each.name in states and CharacterSettings.of(each.values).begins_with_reference
         }
         after = after.with_values({name: as_values(state) for name, state in states.items()})
         if after.values == before.values:

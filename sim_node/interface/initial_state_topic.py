@@ -14,12 +14,14 @@ from msgs_config.parameters import Values
 from sim_node.initial_state import (
     GIVEN,
     INITIAL_STATE,
-    REFERENCE,
+    CharacterSettings,
     check_state,
     describe_start,
 )
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
+from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters
+from sim_node.physics.settings import SimulationSettings
 from sim_node.physics.short_links import describe_speed_bound
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
@@ -41,8 +43,8 @@ class InitialStates:
     ) -> None:
         """Subscribe to the controllers of the characters that begin with their references."""
         self._node = node
-        self._timeout = parameters.values.number("initial_state_timeout")
-        self._speed_limit = parameters.values.number("speed_limit")
+        self._timeout = NodeSettings.of(parameters.values).initial_state_timeout
+        self._speed_limit = SimulationSettings.of(parameters.values).speed_limit
         self._complete = False
         self._characters = {each.setup.name: each for each in characters}
         self._subscriptions: list[_Subscription] = []
@@ -52,7 +54,7 @@ class InitialStates:
         """Subscribe to the controllers of those that these values let begin with references."""
         watched = {each.name for each in self._subscriptions}
         for each in parameters.characters:
-            begins_so = values[each.prefix + INITIAL_STATE] == REFERENCE
+            begins_so = CharacterSettings.of(values, each.prefix).begins_with_reference
             if begins_so and each.name not in watched:
                 character = self._characters[each.name]
                 self._subscriptions.append(_Subscription(self._node, character, self._speed_limit))
@@ -92,7 +94,7 @@ class InitialStates:
         return found
 
     def _look(self) -> dict[str, StampedState]:
-        found = {each.name: each.look() for each in self._subscriptions}
+        found = {each.name: each.last_state() for each in self._subscriptions}
         return {name: state for name, state in found.items() if state is not None}
 
     def _missing(self, found: Mapping[str, StampedState]) -> list["_Subscription"]:
@@ -116,7 +118,7 @@ class _Subscription:
         self._contested = False
         self._rejection = ""
 
-    def look(self) -> StampedState | None:
+    def last_state(self) -> StampedState | None:
         """The last state of the only controller; None while it is missing.
 
         A message does not name its publisher. So while there are several, their states do not
@@ -155,6 +157,6 @@ def log_warnings(node: BusNode, parameters: SimulatorParameters) -> None:
     """Log likely mistakes in files, where a character begins below the ground, and its bounds."""
     for each in parameters.characters:
         character, values = each.character, each.values
-        bound = describe_speed_bound(character, values)
+        bound = describe_speed_bound(character, SimulationSettings.of(values))
         for warning in (*character.warnings, *describe_start(character, values), *bound):
             node.get_logger().warning(f"{each.prefix}{warning}")

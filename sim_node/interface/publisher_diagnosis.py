@@ -109,7 +109,7 @@ class OtherSimulators:
         self._once_logger = logger
         self.seen = False  # whether a topic had more than one publisher at the last `look`
 
-    def look(self) -> None:
+    def look_at_graph(self) -> None:
         """Look at the graph; cheap as long as this node is alone."""
         shared = [topic for topic in self._states if self._node.count_publishers(topic.name) > 1]
         self.seen = bool(shared)

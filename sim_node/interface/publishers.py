@@ -17,13 +17,12 @@ from msgs_config.messages.wrenches import SelectionEncoder, WrenchArrays, encode
 from msgs_config.parameters import Values
 from sim_node.interface.display import DisplayPublishers
 from sim_node.interface.sensors import SensorPublishers
-from sim_node.node_settings import NodeSettings
+from sim_node.node_settings import NodeSettings, SensingSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
-from sim_node.sensors.readers import SensingSettings
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 
-class Publishers:
+class CharacterPublishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
     def __init__(
@@ -191,7 +190,7 @@ class Publishers:
 
 def wait_for_subscribers(
     node: BusNode,
-    publishers: Sequence[Publishers],
+    publishers: Sequence[CharacterPublishers],
     wanted: int,
     stop: StopFlag,
 ) -> Turns:

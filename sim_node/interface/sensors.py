@@ -10,9 +10,9 @@ from msgs_config.bus.publishing import Outgoing, has_subscribers
 from msgs_config.character.sensors import SensorType
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder
-from sim_node.node_settings import NodeSettings
+from sim_node.node_settings import NodeSettings, SensingSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
-from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
+from sim_node.sensors.readers import SensorReader, make_readers
 
 _NO_WRENCH = np.zeros(6)
 

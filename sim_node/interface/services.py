@@ -64,7 +64,7 @@ class Services:
             return Answer(False, str(error))
         answer = self._steps = Answer()
         self._stepped = ticks
-        self._resume()  # which may end the steps at once
+        self._resume()  # it may end the steps at once
         return answer
 
     def _on_reset(self, _: bool) -> Answer:

@@ -9,9 +9,10 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.runtime.throttle import Throttle
-from sim_node.interface.publishers import Publishers
+from sim_node.interface.keyframes import SimulatorKeyframes
+from sim_node.interface.publishers import CharacterPublishers
 from sim_node.interface.world_interface import WorldInterface
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
@@ -27,14 +28,15 @@ class SimulatorPublisher:
         node: BusNode,
         simulation: Simulation,
         world: WorldInterface,
-        of_characters: Sequence[Publishers],
+        of_characters: Sequence[CharacterPublishers],
         samples: Sequence[DynamicsSample],
+        keyframes: SimulatorKeyframes,
     ) -> None:
         """Offer the clock. `samples` are the dynamics that the engine has for each character."""
         self._simulation = simulation
         self._world = world
         self.of_characters = of_characters
-        self._samples = samples
+        self._samples, self._keyframes = samples, keyframes
         self._is_configured = False
         self._clock_topic = node.publisher(topics.CLOCK)
         self._throttle = Throttle()
@@ -56,19 +58,22 @@ class SimulatorPublisher:
 
     def change(self, parameters: SimulatorParameters, since_ns: int | None) -> None:
         """Go on with other parameters, which are published before the next episode's messages."""
-        gravity = parameters.values.number("gravity")
+        sensing = NodeSettings.of(parameters.values).sensing
         for each in self.of_characters:
-            each.change_sensing(make_node_settings(parameters.values).sensing)
-        self._samples = [measure_probe(each.character, gravity) for each in parameters.characters]
+            each.change_sensing(sensing)
+        self._samples = [
+            measure_probe(each.character, sensing.gravity) for each in parameters.characters
+        ]
         if self._is_configured:
             self.publish_configurations(parameters, since_ns)
             # each latched topic keeps one message: the next must not push it out
             flush([each.configuration for each in self.of_characters], _ACKNOWLEDGE_TIME)
 
-    def publish_episode(self) -> None:
-        """Publish that the present tick is the first of an episode."""
+    def publish_episode(self, first_ns: int) -> None:
+        """Publish that the episode began with the state of a stamp."""
+        self._keyframes.episode_ns = first_ns
         for each in self.of_characters:
-            each.publish_episode(self._simulation.episode, self._simulation.stamp_ns)
+            each.publish_episode(self._simulation.episode, first_ns)
 
     def republish(self, *, with_states: bool, with_episode: bool) -> None:
         """Publish the present states again, for late subscribers, or the episode."""
@@ -105,6 +110,7 @@ class SimulatorPublisher:
 
     def _messages(self) -> Iterator[Outgoing]:
         """The messages that are published before the tick can be answered, the states last."""
+        yield from self._keyframes.messages()
         if has_subscribers(self._clock_topic):
             yield self._clock_topic, encode_clock(self._simulation.stamp_ns)
         yield from self._world.messages()

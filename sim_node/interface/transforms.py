@@ -10,8 +10,8 @@ from msgs_config.character.urdf.described_joints import DescribedJoint, Describe
 from msgs_config.frame_names import WORLD
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
-from msgs_config.messages.transforms import TransformsEncoder
 from sim_node.frames import FrameNames
+from sim_node.interface.transforms_encoder import TransformsEncoder
 from sim_node.physics.simulated_character import SimulatedCharacter
 
 _REPETITIONS = 3  # times that a state is published again for a new subscriber

@@ -10,8 +10,8 @@ from msgs_config.messages import topics
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, ball_names, encode_balls
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.balls.throws import ThrowQueue
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import ThrowQueue
 
 
 class WorldInterface:

@@ -240,7 +240,8 @@ class Body:
             mass, _, inertia, *_ = pybullet.getDynamicsInfo(
                 self._body, number, physicsClientId=self._client
             )
-            spin = rotations.rotate(rotations.conjugate(turn), angular)  # about principal axes
+            # Angular velocity about the principal axes, rad/s.
+            spin = rotations.rotate(rotations.conjugate(turn), angular)
             moving = mass * fixed_order.dot(linear, linear)
             energy += 0.5 * float(moving + fixed_order.dot(spin * spin, np.array(inertia)))
         return energy

@@ -2,7 +2,8 @@
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 
 
 class Ground:

@@ -23,7 +23,7 @@ from sim_node.physics.joint_constraints import CORRECTION
 
 _LIMIT_CORRECTION = 0.2  # share of a limit's excess that a step corrects, as the engine's own do
 _MOST_TRIALS = 20
-_HEAVY = 1e9  # times its own inertia, added to a joint that rests: that keeps it there
+_LOCKING_INERTIA = 1e9  # times its own inertia, added to a joint that rests: that keeps it there
 _FORCE_ROUNDING = 1e-9  # share of a force that may be wrong without consequence
 
 
@@ -53,10 +53,10 @@ class JointResistance:
         `known` (n,) is the generalised force of all others but gravity; N m or N.
         """
         step, bias = self._step_s, model.bias_force()
-        heavy = _HEAVY * model.inertia_of_entries()
+        heavy = _LOCKING_INERTIA * model.inertia_of_entries()
         rate = self._coupling.violation(position) * (-CORRECTION / (step * step))
         target, at_limit, side = self._limits(position, velocity)
-        rests, slides = self._first_guess(velocity, heavy / _HEAVY)
+        rests, slides = self._first_guess(velocity, heavy / _LOCKING_INERTIA)
         stopped = np.zeros(len(velocity), dtype=np.bool_)
         force = np.zeros(len(velocity))
         for _ in range(_MOST_TRIALS):

@@ -9,7 +9,8 @@ from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.body import Body
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 
 INSTANT = 1e-7
 """An engine step, s, so short that a difference quotient over it is a derivative."""
@@ -18,7 +19,8 @@ _SEED = 1
 _ROOT_ENTRIES = 6
 _TURN = 0.3  # rad or m that entries are away from the rest pose, at the most
 _SPEED = 1.0  # rad/s or m/s, at the most
-_DAMPED = 1e-3  # share of a speed that damping may take in an instant, and be a derivative
+# Damping is a derivative as long as it takes no larger share of a speed in an instant.
+_MAX_DAMPED_SHARE = 1e-3
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
@@ -51,7 +53,7 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
         _check_inverse_mass(character, np.diag(inverse_mass))
         effort = rng.uniform(-_ACCELERATION, _ACCELERATION, layout.size) / np.diag(inverse_mass)
         rate = character.passive_damping() * np.diag(inverse_mass)
-        velocity[rate * INSTANT > _DAMPED] = 0.0
+        velocity[rate * INSTANT > _MAX_DAMPED_SHARE] = 0.0
         world.set_gravity(gravity)
         body.set_state(position, velocity)
         position, velocity = body.read()  # the state that the engine has made of it

@@ -23,9 +23,9 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.lowest_points import links_in_ground
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
-from msgs_config.parameters import Values
 from msgs_config.shared_parameters import PLANE
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
+from sim_node.physics.settings import SimulationSettings
 
 _SHORT_LENGTH = 0.1  # m: at 10 m/s such a pendulum turns at Bullet's own bound, 100 rad/s
 _LARGEST_TURN = 100.0 / 240.0  # rad or m in an engine step: Bullet's own bound at 240 Hz
@@ -70,14 +70,14 @@ def _bound(step_s: float, speed_limit: float) -> float:
     return min(_LARGEST_TURN / step_s, 0.5 * speed_limit)
 
 
-def describe_speed_bound(character: Character, values: Values) -> tuple[str, ...]:
-    """Warnings if the parameters' values of `sim_node` lead to a bound on the speeds."""
-    has_ground = values.text("terrain") == PLANE
+def describe_speed_bound(character: Character, settings: SimulationSettings) -> tuple[str, ...]:
+    """Warnings if the settings lead to a bound on the speeds."""
+    has_ground = settings.terrain == PLANE
     short, deep = short_joints(character), links_in_ground(character) if has_ground else {}
     if not (short or deep):
         return ()
-    step_s = 1.0 / (values.integer("rate") * values.integer("substeps"))
-    bound = _bound(step_s, values.number("speed_limit"))
+    step_s = settings.step_s
+    bound = _bound(step_s, settings.speed_limit)
     slower = f"no joint and no base is let be faster than {bound:.4g} rad/s or m/s"
     warnings = []
     if deep:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
 from sim_node.initial_state import check_length
+from sim_node.physics.balls.projectiles import Projectiles
 from sim_node.physics.body import Body
 from sim_node.physics.passive_forces import PassiveForces
-from sim_node.physics.projectiles import Projectiles
 from sim_node.physics.short_links import speed_bounds
 from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench
@@ -28,7 +28,7 @@ class CharacterSetup:
     commanded_joints: tuple[str, ...]
     initial_position: tuple[float, ...]  # (n,)
     initial_velocity: tuple[float, ...]  # (n,)
-    name: str = ""  # of the character, where there are several
+    name: str = ""  # the character's name, where there are several
 
     @property
     def prefix(self) -> str:
@@ -64,8 +64,8 @@ class SimulatedCharacter:
 
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
-    pushes: tuple[ExternalWrench, ...]  # that acted during the last tick
-    balls: Projectiles  # of the world that the character is in
+    pushes: tuple[ExternalWrench, ...]  # those that acted during the last tick
+    balls: Projectiles  # the balls of its world
     speed_bounds: dict[bool, float]
     """Of every degree of freedom in the engine, rad/s or m/s; by whether there is a ground."""
 

@@ -9,37 +9,26 @@ from msgs_config.errors import ClosedError, SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import (
     CharacterSetup,
     CharacterSnapshot,
     SimulatedCharacter,
 )
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
-
-
-@dataclass(frozen=True)
-class SimulationSettings:
-    """All that a simulation depends on beside its setups, the efforts, pushes and throws."""
-
-    rate_hz: int
-    substeps: int
-    speed_limit: float  # rad/s or m/s
-    command_delay_ticks: int
-    ball_ticks: int  # after which a ball is taken out of the way; 0: never
-    world: WorldSettings
 
 
 @dataclass(frozen=True)
 class Snapshot:
     """A state between two ticks, for any simulation of equal setups."""
 
-    settings: SimulationSettings  # of the episode
+    settings: SimulationSettings  # the episode's
     tick: int
     episode: int
     characters: tuple[CharacterSnapshot, ...]
-    throws: tuple[ProjectileThrow, ...]  # of the last tick
-    balls: tuple[ProjectileThrow, ...]  # that are in the world
+    throws: tuple[ProjectileThrow, ...]  # those of the last tick
+    balls: tuple[ProjectileThrow, ...]  # those that are in the world
     thrown_at: tuple[int, ...]  # the tick at which each ball was thrown
     world: bytes  # the engine's state
 
@@ -80,7 +69,7 @@ class Simulation:
         # Finding out what touches takes time: it is done in each of several substeps, and after a
         # single one only if it is read.
         self.watches_contacts = False
-        self.throws: tuple[ProjectileThrow, ...] = ()  # at the beginning of the last tick
+        self.throws: tuple[ProjectileThrow, ...] = ()  # those at the beginning of the last tick
         self._thrown_at: tuple[int, ...] = ()
         self._is_closed = False
         self._world = self._fresh_world()
@@ -165,7 +154,7 @@ class Simulation:
             for character in self.characters:
                 character.check_divergence(self.tick)
         except SimulationError:
-            self.tick -= 1  # that state is not published; the first one after a reset has its stamp
+            self.tick -= 1  # it is not published: the first after a reset has its stamp
             raise
 
     def _move_balls(self, throws: Sequence[ProjectileThrow]) -> None:

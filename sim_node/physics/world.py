@@ -3,7 +3,6 @@
 import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -11,31 +10,18 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
-from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.character.model import Character
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
+from sim_node.physics.balls.projectiles import Projectiles
 from sim_node.physics.body import Body
 from sim_node.physics.engine_defaults import UNLIMITED_SPEED
-from sim_node.physics.projectiles import Projectiles
+from sim_node.physics.settings import WorldSettings
 from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine saves its state to files only
 _RAYS = 10_000  # rays in one call; the engine takes up to 16,383
-_DEEPEST = 1000.0  # m: how far below a point a surface is looked for
-
-
-@dataclass(frozen=True)
-class WorldSettings:
-    """The physics of the world."""
-
-    step_s: float = 1.0 / 240.0  # length of one engine step
-    gravity: float = 9.81  # m/s^2, along -z
-    friction: float = 0.9  # of the ground; a contact's is the product of both surfaces'
-    link_friction: float = 0.5  # of every link
-    solver_iterations: int = 10
-    contact_breaking_threshold: float = 0.02  # the engine's own; see the parameter of `sim_node`
-    ground: bool = True  # the plane z = 0
-    terrain: UrdfOptions | None = None  # a fixed body beside the plane
+_MAX_DEPTH = 1000.0  # m: how far below a point a surface is looked for
 
 
 class World:
@@ -152,7 +138,7 @@ class World:
         heights = np.zeros(len(points))
         for first in range(0, len(points), _RAYS):
             rows = points[first : first + _RAYS]
-            ends = rows - (0.0, 0.0, _DEEPEST)
+            ends = rows - (0.0, 0.0, _MAX_DEPTH)
             hits = pybullet.rayTestBatch(rows.tolist(), ends.tolist(), physicsClientId=self._client)
             for row, (body, _, _, place, _) in enumerate(hits, start=first):
                 if body >= 0:

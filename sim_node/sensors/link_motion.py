@@ -14,22 +14,22 @@ from msgs_config.geometry import scalars
 _NO_VECTOR = (0.0, 0.0, 0.0)
 
 
-class Motion(NamedTuple):
+class FrameMotion(NamedTuple):
     """A frame in the world, and its motion."""
 
     origin: scalars.Vector  # m
     turn_xyzw: scalars.Quaternion
-    velocity: scalars.Vector  # of the origin, m/s, world axes
+    velocity: scalars.Vector  # the origin's, m/s, world axes
     angular_velocity: scalars.Vector  # rad/s, in the frame itself
 
-    def at(self, position: Sequence[float], orientation_xyzw: Sequence[float]) -> "Motion":
+    def at(self, position: Sequence[float], orientation_xyzw: Sequence[float]) -> "FrameMotion":
         """The motion of a frame that is fixed to this one, in the pose given in it."""
         axes = scalars.axes(self.turn_xyzw)
         x, y, z = scalars.to_parent(axes, position)
         vx, vy, vz = scalars.to_parent(axes, scalars.cross(self.angular_velocity, position))
         (ox, oy, oz), (wx, wy, wz) = self.origin, self.velocity
         into_frame = scalars.axes(scalars.conjugate(orientation_xyzw))
-        return Motion(
+        return FrameMotion(
             (ox + x, oy + y, oz + z),
             scalars.multiply(self.turn_xyzw, orientation_xyzw),
             (wx + vx, wy + vy, wz + vz),
@@ -37,7 +37,7 @@ class Motion(NamedTuple):
         )
 
 
-AT_REST = Motion(_NO_VECTOR, (0.0, 0.0, 0.0, 1.0), _NO_VECTOR, _NO_VECTOR)
+AT_REST = FrameMotion(_NO_VECTOR, (0.0, 0.0, 0.0, 1.0), _NO_VECTOR, _NO_VECTOR)
 """The motion of the world itself."""
 
 
@@ -56,13 +56,15 @@ class LinkKinematics:
         entries = {joint.name: joint.entries for joint in character.layout.joints}
         self._joints = [(joint, entries.get(joint.name, slice(0, 0))) for joint in reversed(path)]
 
-    def motion(self, position: Sequence[float], velocity: Sequence[float]) -> Motion:
+    def motion(self, position: Sequence[float], velocity: Sequence[float]) -> FrameMotion:
         """The link's motion in a state (n,), message form."""
-        moving = Motion(self._base.position, self._base.orientation_xyzw, _NO_VECTOR, _NO_VECTOR)
+        moving = FrameMotion(
+            self._base.position, self._base.orientation_xyzw, _NO_VECTOR, _NO_VECTOR
+        )
         if self._floats:
             x, y, z, *turn = position[:6]
             vx, vy, vz, wx, wy, wz = velocity[:6]
-            moving = Motion((x, y, z), scalars.exp(turn), (vx, vy, vz), (wx, wy, wz))
+            moving = FrameMotion((x, y, z), scalars.exp(turn), (vx, vy, vz), (wx, wy, wz))
         for joint, entries in self._joints:
             pose = joint.pose_in_parent
             moving = moving.at(pose.position, pose.orientation_xyzw)
@@ -87,8 +89,8 @@ class LinkKinematics:
 
 
 def _move(
-    still: Motion, joint: Joint, position: Sequence[float], velocity: Sequence[float]
-) -> Motion:
+    still: FrameMotion, joint: Joint, position: Sequence[float], velocity: Sequence[float]
+) -> FrameMotion:
     """The motion of a joint's child; `still` is that at position and velocity 0."""
     if joint.type is JointType.PRISMATIC:
         (shift,), (speed,), (x, y, z) = position, velocity, joint.axis_in_child

@@ -45,7 +45,7 @@ class NoiseSource:
         """
         high, at_high = 1, self._walk_step(1)
         low, at_low = 0, (0.0, 0.0, 0.0)
-        while high < tick:  # from a power of two to the next, as far away as 0 is
+        while high < tick:  # each step is to the next power of two, as far away as 0 is
             low, at_low = high, at_high
             high, at_high = 2 * low, _add(at_low, _scale(math.sqrt(low), self._walk_step(2 * low)))
         while tick < high:

@@ -6,7 +6,6 @@ the difference between its velocities in the last two states, over the tick.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,24 +13,16 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import scalars
 from msgs_config.messages.state import StampedState
+from sim_node.node_settings import SensingSettings
 from sim_node.physics.simulated_character import SimulatedCharacter
-from sim_node.sensors.link_motion import AT_REST, LinkKinematics, Motion
+from sim_node.sensors.link_motion import AT_REST, FrameMotion, LinkKinematics
 from sim_node.sensors.noise import NoiseSource
 
-_IMU_DOUBLES = 37  # of sensor_msgs/Imu: orientation, rate and acceleration, a covariance after each
+_IMU_DOUBLES = 37  # sensor_msgs/Imu: orientation, rate, acceleration; a covariance after each
 _ORIENTATION, _ANGULAR_VELOCITY, _ACCELERATION = slice(0, 4), slice(13, 16), slice(25, 28)
 _COVARIANCES = {"orientation": 4, "angular_velocity": 16, "linear_acceleration": 28}
 _DIAGONAL = 4  # entries of a covariance from one variance to the next
-_UNKNOWN = -1.0  # first entry of a covariance: the quantity before it is not measured
-
-
-@dataclass(frozen=True)
-class SensingSettings:
-    """What readings depend on beside states, contacts and the sensor itself."""
-
-    tick_s: float
-    gravity: float  # m/s^2, along -z
-    seed: int  # of the noise
+_NOT_MEASURED = -1.0  # first entry of a covariance: the quantity before it is not measured
 
 
 class SensorReader:
@@ -81,14 +72,14 @@ class ImuReader(SensorReader):
         for quantity, start in _COVARIANCES.items():
             deviations = np.array(sensor.noise.get(quantity, Noise()).stddev)
             self._doubles[start : start + 9 : _DIAGONAL] = deviations * deviations
-        self._last: tuple[StampedState | None, Motion] = (None, AT_REST)
+        self._last: tuple[StampedState | None, FrameMotion] = (None, AT_REST)
         self._first_variance = self._doubles[_COVARIANCES["linear_acceleration"]]
 
     def read(self, tick: int) -> FloatArray:
         """The doubles (37,) of the message."""
         state, before = self._character.state, self._character.before
         motion = self._motion(state)
-        turn, force, variance = motion.turn_xyzw, (0.0, 0.0, 0.0), _UNKNOWN
+        turn, force, variance = motion.turn_xyzw, (0.0, 0.0, 0.0), _NOT_MEASURED
         if before is not None:
             (vx, vy, vz), (ux, uy, uz) = motion.velocity, self._motion(before).velocity
             h, gravity = self._settings.tick_s, self._settings.gravity
@@ -108,7 +99,7 @@ class ImuReader(SensorReader):
         doubles[_COVARIANCES["linear_acceleration"]] = variance
         return doubles
 
-    def _motion(self, state: StampedState) -> Motion:
+    def _motion(self, state: StampedState) -> FrameMotion:
         """The motion of the sensor's frame in a state."""
         read_state, motion = self._last
         if read_state is not state:  # the state before was mostly read a tick ago

@@ -22,7 +22,7 @@ class FlowControl:
     every_ticks: int = 1000  # between calls of `acknowledged`; a publisher keeps 5000 messages
     longest: float = 30.0  # s of wall time that subscribers are waited for
     turn: float = 0.02  # s of wall time in one wait, between looks at everything else
-    _last_tick: int = 0  # at which subscribers were asked for the last time
+    _last_tick: int = 0  # the tick at which subscribers were counted last
     _gives_up_at: float = math.inf
     _has_given_up: bool = False
 

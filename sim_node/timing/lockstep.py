@@ -11,7 +11,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray, all_finite
 from msgs_config.errors import CommandError
 
-_REMEMBERED = 1000  # past ticks whose commands are remembered
+_TICKS_REMEMBERED = 1000  # past ticks whose commands are remembered
 NO_LEADERS: Mapping[str, str] = MappingProxyType({})
 
 
@@ -65,7 +65,8 @@ class CommandCollector(ABC):
             worst = int(np.argmin(np.isfinite(effort)))
             name = self._dof_names[indices[worst]]
             raise CommandError(f"effort of '{name}' is {effort[worst]}; it must be finite")
-        if indices is not self._allowed_indices:  # a sender's are one array, checked once
+        # A sender's indices stay one array object, so that its identity says they are checked.
+        if indices is not self._allowed_indices:
             self._check_allowed(indices)
             self._allowed_indices = indices
 
@@ -109,7 +110,7 @@ class LockstepBarrier(CommandCollector):
             if self._filled is not None:
                 self._tick.given &= ~self._filled
             self._past[self.stamp_ns] = self._tick
-            if len(self._past) > _REMEMBERED:
+            if len(self._past) > _TICKS_REMEMBERED:
                 del self._past[next(iter(self._past))]
         self.stamp_ns = stamp_ns
         self._begin()

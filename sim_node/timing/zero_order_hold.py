@@ -7,7 +7,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from sim_node.timing.lockstep import NO_LEADERS, CommandCollector, CommandStatus
 
-_NEVER = -1
+_NEVER_TICK = -1
 
 
 class ZeroOrderHold(CommandCollector):
@@ -30,8 +30,8 @@ class ZeroOrderHold(CommandCollector):
         """`allowed` (n,) may be commanded; `timeout_ns` is simulated time."""
         super().__init__(dof_names, allowed, leaders)
         self._effort = np.zeros(len(allowed))
-        self._given_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
-        self._stamp_of_command_ns = np.full(len(allowed), _NEVER, dtype=np.int64)
+        self._given_ns = np.full(len(allowed), _NEVER_TICK, dtype=np.int64)
+        self._stamp_of_command_ns = np.full(len(allowed), _NEVER_TICK, dtype=np.int64)
         self._oldest_ns = 0  # stamp of the oldest state that a command of this episode can answer
         self.timeout_ns = timeout_ns
         self.timeouts = 0  # times that a held command became too old
@@ -48,7 +48,7 @@ class ZeroOrderHold(CommandCollector):
     def clear(self) -> None:
         """Discard all commands, and those on their way: the next tick begins a new episode."""
         self._oldest_ns = self.stamp_ns + 1
-        self._given_ns[:] = _NEVER
+        self._given_ns[:] = _NEVER_TICK
         self._was_held[:] = False
 
     @property
@@ -64,7 +64,7 @@ class ZeroOrderHold(CommandCollector):
 
     @property
     def _is_held(self) -> BoolArray:
-        is_held: BoolArray = (self._given_ns != _NEVER) & (
+        is_held: BoolArray = (self._given_ns != _NEVER_TICK) & (
             self.stamp_ns - self._given_ns < self.timeout_ns
         )
         return is_held

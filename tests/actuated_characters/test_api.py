@@ -13,11 +13,11 @@ import pytest
 
 import actuated_characters as ac
 from actuated_characters.bags.reader import read_messages
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import parse_push
-from msgs_config.messages.ros_state import read_state
+from msgs_config.bus.ros_state import read_state
 from tests.support.ros import Processes
 
 ROOT = Path(__file__).parents[2]

@@ -259,7 +259,7 @@ commands = '''
 import sys
 from actuated_characters.cli import main
 run = ["run", "--character", "pendulum", "--duration", "0.1", "--in-process", "--output"]
-codes = main(["list"]), main(["info", sys.argv[1] + "/nothing"]), main([*run, sys.argv[1]])
+codes = main(["run"]), main(["info", sys.argv[1] + "/nothing"]), main([*run, sys.argv[1]])
 assert codes == (0, 1, 0)
 '''
 os.execv(sys.executable, [sys.executable, "-c", commands, *sys.argv[2:]])

@@ -25,7 +25,7 @@ def test_the_version_names_what_the_last_bits_depend_on(capsys: pytest.CaptureFi
 
 
 def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["parameters", "controller_node", "--character", "pendulum"]) == 0
+    assert main(["run", "--parameters", "controller_node", "--character", "pendulum"]) == 0
 
     lines = capsys.readouterr().out.splitlines()
     assert {line.split(":")[0] for line in lines} >= {each.name for each in PARAMETERS}
@@ -34,16 +34,38 @@ def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -
     assert "gains.hinge.p: 50 N m/rad" in "\n".join(lines)
 
 
+def test_the_parameters_of_a_run_are_listed_with_its_values_and_nothing_runs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    listed = ["run", "--clip", "run", "--set", "sim_node.rate:=500", "--log-time", "simulated"]
+
+    for node in ("sim_node", "controller_node", "recorder"):
+        assert main([*listed, "--parameters", node]) == 0
+
+    lines = capsys.readouterr().out.splitlines()
+    for start in (
+        "rate: 500 Hz, by default 240  ",
+        "reference: clip, by default hold  ",
+        "clip: run, by default walk  ",
+        "log_time: simulated, by default wall  ",
+    ):
+        assert any(line.startswith(start) for line in lines), start
+    assert not list(tmp_path.iterdir())
+
+
 def test_run_without_a_word_says_what_there_is_to_run_and_runs_nothing(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "300")
 
     assert main(["run"]) == 0
 
     shown = capsys.readouterr().out
     assert all(name in shown for name in shipped_characters())
     assert "spinkick" in shown
+    assert "34, floating base" in shown
     assert all(f"  {name}: " in shown for name in scene_names())
     commands = [line.split()[1:] for line in shown.splitlines() if "actuated_characters " in line]
     assert ["play", "--scene", "brawl"] in commands
@@ -69,7 +91,7 @@ def test_run_without_a_word_says_what_there_is_to_run_and_runs_nothing(
         ("play --scene br", {"brawl"}),
         ("play --set controller_node.gains.neck.p", {"controller_node.gains.neck.p:="}),
         ("fork run_mine --set controller_node.gains.neck.p", {"controller_node.gains.neck.p:="}),
-        ("parameters rec", {"recorder"}),
+        ("run --parameters rec", {"recorder"}),
         ("study li", {"lift"}),
         ("info run", {"run_mine"}),
     ],

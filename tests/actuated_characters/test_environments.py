@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import actuated_characters as ac
 from actuated_characters.environments import TRACK
 from actuated_characters.environments.track import TrackEnv
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from controller_node.references.base import Reference

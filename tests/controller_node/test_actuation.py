@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from controller_node.actuation import describe_actuation, net_wrench
-from controller_node.parameters import PARAMETERS, character_parameters, commanded_joints
+from controller_node.parameters import commanded_joints, resolve_for
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from msgs_config.parameters import resolve
 from sim_node.physics.body import Body
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,
     FLOATING_CHARACTERS,
@@ -58,7 +57,7 @@ floating_characters = pytest.mark.parametrize("name", FLOATING_CHARACTERS, ids=c
 def actuators(whole: Character, assistance: bool) -> int:
     """How many degrees of freedom the controller commands."""
     given = {"character": whole.name, "root_assistance": assistance}
-    values = resolve(PARAMETERS + character_parameters(whole), given)
+    values = resolve_for(whole, given)
     return int(whole.layout.mask(commanded_joints(whole, values)).sum())
 
 

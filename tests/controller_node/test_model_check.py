@@ -17,7 +17,6 @@ from msgs_config.character.model import Character, Link
 from msgs_config.errors import CharacterError, MessageError
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.probe import DynamicsSample, read_probe
-from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.probe import measure_probe
 from tests.support.physics import EVERY_CHARACTER, character, character_id
@@ -202,8 +201,8 @@ def test_a_run_compares_before_it_starts_anything(monkeypatch: pytest.MonkeyPatc
 def description(name: str, probe: DynamicsSample | None, **given: object) -> str:
     """What a simulator says of itself."""
     whole = character(name)
-    parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
-    return configuration.describe(whole, resolve(parameters, given), probe=probe)
+    values = for_simulator.resolve_alone(whole, given)
+    return configuration.describe(whole, values, probe=probe)
 
 
 def test_a_configuration_carries_the_probe_and_may_lack_it() -> None:

@@ -34,7 +34,7 @@ def _long_clip(path: Path) -> None:
     own = path.with_name("own")
     run = ("run", "--clip", "walk", "--duration", "6", "--composed", "--output", own)
     _call(path, *run)
-    _call(path, "motion", "export", own, "--output", own / "own.bvh")
+    _call(path, "export", own, "--output", own / "own.bvh")
     _call(path, "motion", "import", own / "own.bvh", "--output", path)
     shutil.rmtree(own)
 

@@ -1,4 +1,4 @@
-"""Kills the recorder at random moments, and checks the bags that `recover` makes of the rest.
+"""Kills the recorder at random moments, and checks the bags that a recovery makes of the rest.
 
 A humanoid is simulated in real time all the while. Each recorder joins it, says what it has
 flushed, and is killed; what it recorded must come back whole, without a gap, up to what was flushed

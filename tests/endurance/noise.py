@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState, MultiDOFJointState  # noqa: E402
 from std_msgs.msg import Header, String  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
 
-from actuated_characters.metrics.run_metrics import StateHash  # noqa: E402
+from actuated_characters.metrics.state_hash import StateHash  # noqa: E402
 from actuated_characters.runs.bare_loop import ticks_in_process  # noqa: E402
 from actuated_characters.runs.plan import make_plan  # noqa: E402
 from actuated_characters.runs.processes import Child, Children  # noqa: E402

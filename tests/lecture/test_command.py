@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lecture.catalogue import NAMES, load_study
+from lecture.framework.catalogue import NAMES, load_study
 from tests.support.ros import PATIENCE, wait_until
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lecture import lift
 from lecture.framework.result import StudyResult
 from lecture.theory import second_order
-from lecture.theory.lift_responses import LawGains, Response, find_bound
+from lecture.theory.lift_responses import LiftLaw, Response, find_bound
 from msgs_config.arrays import FloatArray
 from tests.support.in_process import InProcessRunner
 
@@ -124,7 +124,7 @@ def test_pid_is_unstable_where_a_root_has_a_positive_real_part() -> None:
 def test_a_bound_is_found_between_the_stable_and_the_unstable() -> None:
     """By responses that grow or decay as `share - 1` says of a bound that is not theory's."""
 
-    def respond(gains: LawGains) -> Response:
+    def respond(gains: LiftLaw) -> Response:
         growth = gains.stiffness / 1100.0 - 1.0
         height: FloatArray = 1.0 + np.exp(5.0 * growth * TIMES) * np.cos(20.0 * TIMES)
         return Response(gains, TIMES, height, diverged=False)

@@ -22,7 +22,7 @@ from lecture.theory.euler import (
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import FLOATING_CHARACTERS, LoneWorld, character, momentum, random_state
 

@@ -23,7 +23,7 @@ from lecture.framework.tracking import (
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import pybullet
 from msgs_config.geometry import rotations
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import LoneWorld, character
 

@@ -22,7 +22,7 @@ NEEDS = [  # package, extra, arguments
     ("viser", "view", ("view", "run")),
     ("numba", "plan", (*WALK, "--planner", "predictive")),
     ("numba", "plan", (*WALK, "--planner", "predictive", "--in-process")),
-    ("numba", "plan", ("reconstruct", "--clip", "walk", "--output", "walk.json")),
+    ("numba", "plan", ("motion", "reconstruct", "--clip", "walk", "--output", "walk.json")),
     ("numba", "plan", ("study", "athletics", "--output", "results")),
     ("numba", "plan", ("study", "all", "--output", "results")),
     ("av", "video", ("render", "run", "--output", "film.mp4")),
@@ -43,7 +43,7 @@ def test_the_hint_is_the_one_of_the_docs() -> None:
 
 
 def test_what_is_installed_is_no_error() -> None:
-    require_extra("search", "the search")
+    require_extra("plan", "planned motion")
 
 
 @pytest.mark.parametrize(
@@ -90,8 +90,6 @@ def test_environments_without_gymnasium_say_what_to_install(
     [
         ("numba", "plan", "benchmarks"),
         ("viser", "view", "benchmarks"),
-        ("numba", "plan", "benchmarks.planner.walks"),
-        ("cma", "search", "benchmarks.athletics.search"),
     ],
 )
 def test_benchmarks_without_an_extra_end_in_one_line(package: str, extra: str, module: str) -> None:

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from actuated_characters.bags.recording import read_recordings
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.bare_loop import ticks_in_process
@@ -28,9 +28,9 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.messages import topics
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 from msgs_config.shared_parameters import placed
-from sim_node.initial_state import begins_with_reference
+from sim_node.initial_state import CharacterSettings
 from sim_node.parameters import CharacterParameters, load_parameters
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
@@ -85,8 +85,7 @@ def flattened(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[st
 def controller_values(file: str, node: str) -> tuple[Character, Values]:
     parameters = given(file, node)
     character = placed(load_character(parameters["character"]), parameters)
-    declared = for_controller.PARAMETERS + for_controller.character_parameters(character)
-    return character, resolve(declared, parameters)
+    return character, for_controller.resolve_for(character, parameters)
 
 
 def controllers(file: str) -> list[str]:
@@ -118,7 +117,7 @@ def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
             name: values[name] for name in SHARED
         }
         commanded = for_controller.commanded_joints(character, values)
-        assert set(part.values.texts("commanded_joints")) == set(commanded)
+        assert set(part.values["commanded_joints"]) == set(commanded)
 
 
 MOTIONS = ["humanoid_balance.yaml", "humanoid_walk.yaml", "two_humanoids.yaml"]
@@ -130,7 +129,8 @@ def test_the_file_of_a_motion_holds_no_state(file: str) -> None:
 
     assert not [name for name in parameters if "initial_pos" in name or "initial_vel" in name]
     assert all(
-        begins_with_reference(part.values) for part in load_parameters(parameters).characters
+        CharacterSettings.of(part.values).begins_with_reference
+        for part in load_parameters(parameters).characters
     )
 
 

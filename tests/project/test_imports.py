@@ -18,7 +18,7 @@ PACKAGES = (
     "lecture",
 )
 ROS_NAMES = re.compile(
-    r"rclpy|rpyutils|rosidl_\w+|ament_\w+|builtin_interfaces|rcl_interfaces|\w+_(msgs|srvs)"
+    r"rclpy|rpyutils|launch|launch_ros|rosidl_\w+|ament_\w+|builtin_interfaces|rcl_interfaces|\w+_(msgs|srvs)"
 )
 COMPOSED = "actuated_characters/composed"
 ENGINES = {  # who imports them; how far they are known beyond that is in pyproject.toml

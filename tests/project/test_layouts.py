@@ -13,7 +13,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.frame_names import BASE_FRAME
 from msgs_config.messages import topics
 from msgs_config.messages.topic import Topic
-from sim_node.frames import ODOM_FRAME
+from sim_node.frames import FrameNames
 
 CONFIG = Path(__file__).parents[2] / "config"
 DISPLAYS = {  # the message that each class of RViz' displays subscribes to
@@ -57,10 +57,10 @@ def test_a_display_of_rviz_subscribes_to_what_is_published_as_it_is(display: Any
 def test_rviz_and_foxglove_look_at_frames_that_there_are() -> None:
     layout = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["3D!model"]
 
-    assert rviz()["Global Options"]["Fixed Frame"] == ODOM_FRAME.default
+    assert rviz()["Global Options"]["Fixed Frame"] == FrameNames.odom
     assert rviz()["Views"]["Current"]["Target Frame"] == BASE_FRAME
     assert layout["followTf"] == BASE_FRAME
-    assert layout["layers"]["grid"]["frameId"] == ODOM_FRAME.default
+    assert layout["layers"]["grid"]["frameId"] == FrameNames.odom
 
 
 def test_every_panel_of_foxglove_is_in_its_layout_once() -> None:

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from lecture.catalogue import NAMES
+from lecture.framework.catalogue import NAMES
 
 PROJECT = Path(__file__).parents[2]
 TEXT = (PROJECT / "docs/lecture.md").read_text("utf-8")

@@ -151,7 +151,7 @@ def test_the_state_path_has_both_sides() -> None:
         "controller_node/references/offsets.py",
         "msgs_config/character/dynamics.py",
         "msgs_config/geometry/rotations.py",
-        "sim_node/physics/sphere_sweep.py",
+        "sim_node/physics/balls/sphere_sweep.py",
         "sim_node/timing/lockstep.py",
         "sim_node/physics/body.py",
         "sim_node/physics/passive_forces.py",

@@ -24,9 +24,9 @@ for command in (
     ["replay", "run"],
     ["fork", "run", "--at", "0.3", "--output", "fork"],
     ["compare", "run", "fork"],
-    ["info", "run"],
+    ["info", "run", "--ticks"],
     ["report", "run"],
-    ["export", "run", "--output", "table"],
+    ["export", "run", "--output", "table.csv"],
 ):
     assert main(command) == 0, command
 ac.run("pendulum", 0.2, output="api", in_process=True)

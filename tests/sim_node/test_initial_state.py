@@ -14,7 +14,6 @@ from msgs_config.clips.reading import available_clips
 from msgs_config.errors import ConfigurationError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import resolve
 from sim_node.initial_state import check_state
 from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
@@ -48,8 +47,8 @@ ANSWERED = {"hinge": 0.25}
 
 def reference_state(name: str, **given: object) -> StampedState:
     whole = character(name)
-    declared = for_controller.PARAMETERS + for_controller.character_parameters(whole)
-    return make_motion(whole, resolve(declared, {"character": name, **given})).first_state()
+    values = for_controller.resolve_for(whole, {"character": name, **given})
+    return make_motion(whole, values).first_state()
 
 
 @pytest.mark.parametrize("name", EVERY_CHARACTER, ids=character_id)

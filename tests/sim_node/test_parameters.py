@@ -7,15 +7,13 @@ import pytest
 
 from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError, CharacterError, ConfigurationError
-from msgs_config.parameters import resolve
 from sim_node.parameters import (
     CHARACTERS,
-    PARAMETERS,
-    character_parameters,
+    WORLD_PARAMETERS,
     load_parameters,
+    resolve_alone,
 )
 from sim_node.simulation_factory import make_simulation_settings
-from sim_node.world_parameters import WORLD_PARAMETERS
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
     box_character,
@@ -59,7 +57,7 @@ def test_without_names_there_is_one_character_whose_parameters_have_no_prefix(
 ) -> None:
     whole = character(str(given.get("character", "humanoid")))
     own = {name: value for name, value in given.items() if name != "characters"}
-    alone = resolve(PARAMETERS + character_parameters(whole), own)
+    alone = resolve_alone(whole, own)
 
     loaded = load_parameters(given)
 
@@ -101,7 +99,7 @@ def test_each_name_is_a_character_with_parameters_of_its_own() -> None:
     own = [f"{name}.{parameter}" for name in ("one", "arm") for parameter in OWN]
     assert [parameter.name for parameter in loaded.declared] == [*WORLD, *own]
     assert list(loaded.values) == [*WORLD, *own]
-    assert loaded.values.integer("rate") == loaded.characters[1].values.integer("rate") == 100
+    assert loaded.values["rate"] == loaded.characters[1].values["rate"] == 100
     assert loaded.values["characters"] == ["one", "arm"]
     assert loaded.values["arm.character"] == "franka_panda"
     assert loaded.values["arm.initial_position"] == list(character("franka_panda").rest_position)
@@ -124,8 +122,8 @@ def test_what_is_given_without_a_name_is_for_all_that_have_nothing_of_their_own(
     loaded = load_parameters(dict(reversed(given.items())) if reverse else given)
 
     assert [each.character.name for each in loaded.characters] == ["lift", "pendulum", "lift"]
-    velocities = [each.values.numbers("initial_velocity") for each in loaded.characters]
-    assert velocities == [(0.5,), (0.5,), (0.25,)]
+    velocities = [each.values["initial_velocity"] for each in loaded.characters]
+    assert velocities == [[0.5], [0.5], [0.25]]
     assert loaded.values["one.initial_velocity"] == [0.5]
 
 
@@ -135,8 +133,8 @@ def test_a_placement_moves_the_rest_pose_that_a_character_begins_in() -> None:
     )
 
     # turned about z at the world's origin, then moved
-    one, two = (each.values.numbers("initial_position") for each in loaded.characters)
-    assert one == character("humanoid").rest_position
+    one, two = (each.values["initial_position"] for each in loaded.characters)
+    assert one == list(character("humanoid").rest_position)
     x, y, z = one[:3]
     np.testing.assert_allclose(two[:3], [1.0 - y, 2.0 + x, 0.5 + z], atol=1e-12)
     assert two[6:] == one[6:]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pybullet
 
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.scenes.scene import SIMULATOR, Scene
 from controller_node import parameters as for_controller
 from controller_node.controller import Controller
@@ -14,7 +14,6 @@ from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import resolve
 from msgs_config.shared_parameters import placed
 from sim_node.parameters import load_parameters
 from sim_node.physics.simulation import Simulation
@@ -41,8 +40,7 @@ def _make_controllers(scene: Scene) -> Iterator[tuple[Controller, StampedState]]
     for name in scene.characters:
         given = scene.nodes[f"{name}/controller_node"]
         character = placed(load_character(str(given["character"])), given)
-        declared = for_controller.PARAMETERS + for_controller.character_parameters(character)
-        values = resolve(declared, given)
+        values = for_controller.resolve_for(character, given)
         motion = make_motion(character, values)
         yield (
             for_controller.make_controller(character, motion.reference, values),

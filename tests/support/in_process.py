@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lecture.catalogue import load_study
+from lecture.framework.catalogue import load_study
 from lecture.framework.result import StudyResult
 from lecture.framework.runner import Runner
 from lecture.framework.study import RunResult, RunSpec

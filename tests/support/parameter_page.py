@@ -17,7 +17,7 @@ HEAD = """\
 `run --set NODE.NAME:=VALUE`, `--ros-args -p NAME:=VALUE` and parameter files set them; those
 marked *live* may change while the node runs, as may those marked *next reset*, which count from the
 first state of the next episode on. With several `characters`, those of one are set below its name.
-`actuated_characters parameters NODE --character NAME` prints the defaults of a character.
+`actuated_characters run --parameters NODE --character NAME` prints those of a character's run.
 """
 
 

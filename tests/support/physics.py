@@ -23,12 +23,12 @@ from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
-from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
 from sim_node.physics.body import Body
+from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharacter
-from sim_node.physics.simulation import Simulation, SimulationSettings
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.simulation import Simulation
+from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import (
     make_character_setup,
@@ -285,8 +285,7 @@ def advance(world: LoneWorld, effort: FloatArray, steps: int = 1) -> None:
 def simulation(name: str, **given: object) -> LoneSimulation:
     """A simulation with the parameters given, the others at their defaults."""
     whole = character(name)
-    parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
-    values = resolve(parameters, given)
+    values = for_simulator.resolve_alone(whole, given)
     return LoneSimulation(make_character_setup(whole, values), make_simulation_settings(values))
 
 
@@ -302,8 +301,7 @@ def controller(name: str, **given: object) -> Controller:
 
 def make_driver(whole: Character, given: Mapping[str, object]) -> Controller:
     """A controller of a character with the parameters given, the others at their defaults."""
-    parameters = for_controller.PARAMETERS + for_controller.character_parameters(whole)
-    values = resolve(parameters, given)
+    values = for_controller.resolve_for(whole, given)
     return for_controller.make_controller(whole, make_motion(whole, values).reference, values)
 
 

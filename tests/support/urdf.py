@@ -16,18 +16,19 @@ _LOAD = """
 import json, resource, sys, time
 from msgs_config.character.loading import load_character
 from msgs_config.errors import CharacterError
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-start = time.monotonic()
-try:
-    character = load_character(sys.argv[1])
-except CharacterError as error:
-    outcome = {"refused": str(error)}
-else:
-    links = [(link.name, link.joint.name, link.parent) for link in character.links]
-    outcome = {"size": character.layout.size, "links": links}
-outcome["seconds"] = time.monotonic() - start
-outcome["mebibytes"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-print(json.dumps(outcome))
+for path in sys.argv[1:]:
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.monotonic()
+    try:
+        character = load_character(path)
+    except CharacterError as error:
+        outcome = {"refused": str(error)}
+    else:
+        links = [(link.name, link.joint.name, link.parent) for link in character.links]
+        outcome = {"size": character.layout.size, "links": links}
+    outcome["seconds"] = time.monotonic() - start
+    outcome["mebibytes"] = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    print(json.dumps(outcome), flush=True)
 """
 
 
@@ -82,16 +83,18 @@ def refusal(path: Path | str) -> str:
     return line
 
 
-def load_elsewhere(path: Path) -> dict[str, Any]:
-    """What another process makes of a character: the engine can take its own process down."""
+def load_elsewhere(*paths: Path) -> list[dict[str, Any]]:
+    """What another process makes of characters: the engine can take its own process down."""
     done = subprocess.run(
-        [sys.executable, "-c", _LOAD, str(path)],
+        [sys.executable, "-c", _LOAD, *map(str, paths)],
         cwd=PROJECT,
         capture_output=True,
         text=True,
         timeout=60,
         check=False,
     )
-    assert done.returncode == 0, f"ended with {done.returncode}: {done.stderr[-500:]}"
-    outcome: dict[str, Any] = json.loads(done.stdout)
-    return outcome
+    outcomes = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 0, (
+        f"ended with {done.returncode} after {len(outcomes)} of them: {done.stderr[-500:]}"
+    )
+    return outcomes

@@ -19,7 +19,7 @@ class MessageDefinition(NamedTuple):
 
     type_name: str  # such as "sensor_msgs/msg/JointState"
     text: str  # the .msg file, then the .msg files of all types in it, each below its name
-    type_hash: str  # as REP 2016 defines it: "RIHS01_" and 64 hexadecimal digits
+    type_hash: str  # REP 2016's hash: "RIHS01_" and 64 hexadecimal digits
 
 
 @cache

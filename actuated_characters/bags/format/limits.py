@@ -1,7 +1,4 @@
-"""Unpacks what is compressed in a bag, up to a limit: a small file can stand for any size.
-
-A declared size may be a reason to reject a file; unpacking itself ends at the limit.
-"""
+"""Limits on the sizes of what is in a bag, which hold for what is unpacked, too."""
 
 from pathlib import Path
 
@@ -21,16 +18,13 @@ _LONGEST_HEAD = 18  # bytes of the longest header of a zstd frame
 
 
 class LimitError(ValueError):
-    """Something would unpack to more than it may."""
+    """Something is larger than it may be."""
 
 
 def check_size(what: str, size: int, limit: int) -> None:
     """Raise LimitError if a size is over its limit, bytes."""
     if size > limit:
-        known = f"at least {size / MIB:.0f} MiB, " if size >= limit + MIB else ""
-        raise LimitError(
-            f"{what} would unpack to {known}more than the limit of {limit / MIB:.0f} MiB"
-        )
+        raise LimitError(f"{what}: larger than the limit of {limit / MIB:g} MiB")
 
 
 def unpack_message(stored: bytes, *, packed: bool) -> bytes:
@@ -49,7 +43,6 @@ def unpack(what: str, packed: bytes, compression: str, limit: int) -> bytes:
         check_size(what, len(packed), limit)
         return packed
     if compression == ZSTD:
-        check_size(what, zstd.get_frame_info(packed).decompressed_size or 0, limit)
         decompressor = zstd.ZstdDecompressor()
     elif compression == "lz4":
         decompressor = LZ4FrameDecompressor()
@@ -70,7 +63,7 @@ def unpack_file(packed: Path, copy: Path) -> None:
         OSError: the copy cannot be written.
         ZstdError, EOFError: the file is damaged.
     """
-    with packed.open("rb") as file:
+    with packed.open("rb") as file:  # what it declares: the disk need not be filled up first
         declared = zstd.get_frame_info(file.read(_LONGEST_HEAD)).decompressed_size or 0
     check_size("it", declared, MOST_OF_FILE)
     with copy.open("wb") as sink, zstd.open(packed, "rb") as source:

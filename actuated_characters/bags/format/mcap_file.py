@@ -26,24 +26,26 @@ from actuated_characters.bags.format.storage import (
     OFFERED_QOS,
     SIMULATED,
     TYPE_HASH,
+    Beginning,
+    FileStatistics,
     StoredMessage,
     StoredTopic,
 )
 from msgs_config.errors import RecordingError
 
+_ALL = Beginning()
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # a record's kind, and the length of its content
-_MESSAGE_HEAD = struct.Struct(
-    "<HIQQ"
-)  # channel, number, log time, time of publishing; then the message
+# Channel, number, log time and time of publishing, before the message itself.
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
 _MESSAGE, _CHUNK = int(Opcode.MESSAGE), int(Opcode.CHUNK)
 _IN_CHUNK = {int(Opcode.SCHEMA), int(Opcode.CHANNEL), _MESSAGE}
-_ENDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # a file's last records: kind, length
-_UNKNOWN = range(max(Opcode) + 1, 0x80)  # kinds that MCAP lacks; other programs' begin at 0x80
+_LAST_RECORDS = {(int(Opcode.DATA_END), 4), (int(Opcode.FOOTER), 20)}  # kinds and lengths
+_UNKNOWN_OPCODES = range(max(Opcode) + 1, 0x80)  # at 0x80 those of other programs begin
 _BEHIND_SUMMARY_CRC = 4 + len(_MAGIC)  # bytes from the checksum to the end
 _CUT_OFF = "bytes cut off"
 _MOST_NAMED = 5  # kinds of damage that a sentence names
-_LEAST_HELD = 200  # bytes that a message takes in memory beside its own
+_MESSAGE_OVERHEAD = 200  # bytes that a message takes in memory beside its own
 
 
 class McapFile:
@@ -65,7 +67,7 @@ class McapFile:
         """Whether there was something compressed."""
         self._schemas: dict[int, Schema] = {}
         self._chunks: list[ChunkIndex] = []
-        self._count = 0  # channels that the file's statistics count
+        self._statistics: Statistics | None = None  # the file's own
         self._names: Collection[str] | None = None  # topics that are read; None: all
 
     @property
@@ -111,10 +113,34 @@ class McapFile:
 
     @property
     def _is_indexed(self) -> bool:
-        return bool(self._chunks) and len(self.topics) >= max(self._count, 1)
+        count = 0 if self._statistics is None else self._statistics.channel_count
+        return bool(self._chunks) and len(self.topics) >= max(count, 1)
 
-    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
+    def statistics(self) -> FileStatistics:
+        """The file's own statistics; those of one that has none are counted message by message.
+
+        Raises:
+            ValueError, KeyError: the file is damaged.
+        """
+        counts, known = Counter[str](), self._statistics
+        if known is not None:
+            for channel, count in known.channel_message_counts.items():
+                counts[self.topics[channel].name] += count
+            return FileStatistics(counts, known.message_start_time, known.message_end_time)
+        first_ns = last_ns = 0
+        for message in self.messages():
+            first_ns = min(first_ns, message.log_time_ns) if counts else message.log_time_ns
+            last_ns = max(last_ns, message.log_time_ns)
+            counts[message.topic.name] += 1
+        self._check_whole()
+        return FileStatistics(counts, first_ns, last_ns)
+
+    def messages_by_time(
+        self, names: Collection[str], beginning: Beginning = _ALL
+    ) -> Iterator[StoredMessage]:
         """Yield the messages on some topics by log time; a chunk is unpacked when its time comes.
+
+        Chunks that end before the beginning are left out, but for topics that are read whole.
 
         Raises:
             ValueError: the file is damaged, or more than a limit would have to be held.
@@ -124,16 +150,20 @@ class McapFile:
             yield from sorted(self._all_messages())
             return
         chosen = {number for number, topic in self.topics.items() if topic.name in names}
+        whole = {number for number in chosen if self.topics[number].name in beginning.whole}
         pending: list[StoredMessage] = []
         for index in sorted(self._chunks, key=lambda each: each.message_start_time):
-            if index.message_index_offsets and not index.message_index_offsets.keys() & chosen:
+            wanted = chosen if index.message_end_time >= beginning.log_time_ns else whole
+            if index.message_index_offsets and not index.message_index_offsets.keys() & wanted:
                 continue
             start_ns = index.message_start_time
             ready = bisect_left(pending, start_ns, key=lambda each: each.log_time_ns)
             yield from pending[:ready]
             del pending[:ready]
             size = sum(len(message.raw) for message in pending) + index.uncompressed_size
-            limits.check_size("chunks", max(size, index.chunk_length), limits.MOST_OF_CHUNK)
+            limits.check_size(
+                "overlapping chunks", max(size, index.chunk_length), limits.MOST_OF_CHUNK
+            )
             pending += self._read_chunk(index)
             pending.sort()
         yield from pending
@@ -152,7 +182,7 @@ class McapFile:
         """Yield the messages of a file without an index, in its order, up to a limit."""
         size = 0
         for message in self.messages():
-            size += len(message.raw) + _LEAST_HELD
+            size += len(message.raw) + _MESSAGE_OVERHEAD
             limits.check_size("a file without an index", size, limits.MOST_SORTED)
             yield message
         self._check_whole()
@@ -182,7 +212,7 @@ class McapFile:
                         yield StoredMessage(log_time_ns, published_ns, at, topic, raw, number)
                 elif kind in wanted:
                     yield from self._parse(kind, stream.read(length), begin)
-                elif kind in _UNKNOWN:
+                elif kind in _UNKNOWN_OPCODES:
                     self.unreadable["unknown record"] += 1
         except _CutOffError as error:
             self.unreadable[_CUT_OFF] += error.size
@@ -255,7 +285,7 @@ class McapFile:
             elif isinstance(record, ChunkIndex):
                 self._chunks.append(record)
             elif isinstance(record, Statistics):
-                self._count = record.channel_count
+                self._statistics = record
 
 
 class _CutOffError(ValueError):
@@ -278,7 +308,7 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, int, int]]:
     """
     while size - (begin := stream.tell()) > _HEAD.size:
         kind, length = _HEAD.unpack(stream.read(_HEAD.size))
-        if (kind, length) in _ENDS:
+        if (kind, length) in _LAST_RECORDS:
             return
         end = begin + _HEAD.size + length
         if not kind or end > size:  # the format has no kind 0
@@ -289,7 +319,6 @@ def _records(stream: BinaryIO, size: int) -> Iterator[tuple[int, int, int]]:
 
 def _unpack_chunk(chunk: Chunk) -> bytes:
     """Return the records in a chunk. Raises an error of `limits.DAMAGED` if they cannot be."""
-    limits.check_size("a chunk", chunk.uncompressed_size, limits.MOST_OF_CHUNK)
     raw = limits.unpack("a chunk", chunk.data, chunk.compression, limits.MOST_OF_CHUNK)
     is_sound = len(raw) == chunk.uncompressed_size
     if not is_sound or chunk.uncompressed_crc not in (0, zlib.crc32(raw)):

@@ -1,6 +1,6 @@
 """The `metadata.yaml` of a rosbag2 directory: read of any version of rosbag2, and written."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
 METADATA = "metadata.yaml"
-_OUTERMOST = "rosbag2_bagfile_information"
+_TOP_LEVEL_KEY = "rosbag2_bagfile_information"
 BAG = "bag"  # name of the bag in a run's directory
 EARLIER_BAG = BAG + "-earlier"  # older part of the bag while a recording of bounded size is made
 FILE, MESSAGE = "file", "message"  # what rosbag2 compressed; MCAP's chunks say so themselves
@@ -29,9 +29,10 @@ _LATEST_VERSION = 9  # version that Jazzy writes
 class BagMetadata(NamedTuple):
     """The files and topics of a bag."""
 
-    files: tuple[Path, ...]  # in the order in which they were written
+    files: tuple[Path, ...]  # the files in the order of writing
     topics: tuple[str, ...]
     compression_mode: str  # FILE, MESSAGE or empty
+    content: Mapping[str, Any]  # all of it
 
 
 def read_metadata(bag: Path) -> BagMetadata:
@@ -71,13 +72,13 @@ def load_metadata(bag: Path) -> Any:
         text = file.read(MOST_OF_METADATA + 1)
     place = f"{METADATA} is damaged"
     content = files.parse_yaml(place, text, RecordingError, most=MOST_OF_METADATA)
-    return content[_OUTERMOST]
+    return content[_TOP_LEVEL_KEY]
 
 
 def write_metadata(bag: Path, content: Mapping[str, Any]) -> None:
     """Write `metadata.yaml`, whole. Raises OSError."""
     scratch = bag / f"{METADATA}.tmp"
-    text = yaml.safe_dump({_OUTERMOST: dict(content)}, sort_keys=False)
+    text = yaml.safe_dump({_TOP_LEVEL_KEY: dict(content)}, sort_keys=False)
     scratch.write_text(text, encoding="utf-8")
     scratch.replace(bag / METADATA)
 
@@ -101,20 +102,20 @@ def _parse(bag: Path, content: Mapping[str, Any]) -> BagMetadata:
             problem = one_of(what, value, [choice for choice in choices if choice])
             raise RecordingError(f"cannot read recording {bag}: {problem}")
     present = tuple(bag / PurePath(path).name for path in paths)  # old paths include the bag's name
-    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode)
+    return BagMetadata(present, tuple(str(topic["name"]) for topic in topics), mode, content)
 
 
-def storage_of(paths: Collection[str]) -> str:
+def storage_of(paths: Iterable[str]) -> str:
     """The storage of a bag's files by the suffix of the first one; empty if that says none."""
     suffixes = {suffix for path in list(paths)[:1] for suffix in PurePath(path).suffixes}
     return next((name for name, suffix in SUFFIXES.items() if suffix in suffixes), "")
 
 
 def recover_hint(bag: Path, does: str) -> str:
-    """The end of an error about a bag: what the command `recover` does, if it can do anything."""
+    """The end of an error about a bag: what `info --recover` does, if it can do anything."""
     run = bag.parent if bag.name == BAG else bag
     can = bag.is_dir() and any(file.suffix == SUFFIXES[MCAP] for file in bag.iterdir())
-    return f"; 'actuated_characters recover {run}' {does}" if can else ""
+    return f"; 'actuated_characters info {run} --recover' {does}" if can else ""
 
 
 def _missing(bag: Path) -> str:

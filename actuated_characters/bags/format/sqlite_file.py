@@ -10,6 +10,8 @@ from actuated_characters.bags.format.storage import (
     LOG_TIME,
     MOST_OF_METADATA,
     SIMULATED,
+    Beginning,
+    FileStatistics,
     StoredMessage,
     StoredTopic,
 )
@@ -59,8 +61,20 @@ class SqliteFile:
         except (sqlite3.OperationalError, RecordingError, KeyError, TypeError):
             return False
 
-    def messages_by_time(self, names: Collection[str]) -> Iterator[StoredMessage]:
-        """Yield the messages on some topics by log time.
+    def statistics(self) -> FileStatistics:
+        """Count the messages without reading them. Raises sqlite3.Error: the file is damaged."""
+        rows = self._tables.execute(
+            "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages "
+            "GROUP BY topic_id"
+        ).fetchall()
+        counts = {self.topics[number].name: count for number, count, _, _ in rows}
+        first_ns = min((each for *_, each, _ in rows), default=0)
+        return FileStatistics(counts, first_ns, max((each for *_, each in rows), default=0))
+
+    def messages_by_time(
+        self, names: Collection[str], beginning: Beginning | None = None
+    ) -> Iterator[StoredMessage]:
+        """Yield the messages on some topics by log time, also those before the beginning.
 
         Raises:
             ValueError, sqlite3.Error: the file is damaged, or a message is too large.
@@ -77,5 +91,5 @@ class SqliteFile:
                 yield StoredMessage(log_time_ns, published_ns, (place, 0), topic, raw)
         except sqlite3.DataError as error:
             raise limits.LimitError(
-                f"a message is larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
+                f"a message: larger than the limit of {limits.MOST_OF_MESSAGE >> 20} MiB"
             ) from error

@@ -1,5 +1,6 @@
 """Names of rosbag2's storages and compressions, and a message as a file of a bag stores it."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 MCAP, SQLITE3 = "mcap", "sqlite3"
@@ -36,10 +37,25 @@ class StoredMessage(NamedTuple):
 
     log_time_ns: int
     published_ns: int | None  # wall time; None where the storage does not have it
-    place: tuple[int, int]  # where the message is in the file
+    place: tuple[int, int]  # says where the message is in the file
     topic: StoredTopic
-    raw: bytes  # as it is stored: rosbag2 may have compressed each message
+    raw: bytes  # the stored bytes: rosbag2 may have compressed each message
     number: int = 0  # its number among its channel's messages; 0 if it has none
+
+
+class FileStatistics(NamedTuple):
+    """The messages of a file, counted."""
+
+    counts: Mapping[str, int]  # messages by topic; topics without any may be left out
+    first_ns: int  # log times of the first message and of the last; 0 without messages
+    last_ns: int
+
+
+class Beginning(NamedTuple):
+    """What may be left out in front: the messages of before, but of some topics."""
+
+    log_time_ns: int = 0
+    whole: frozenset[str] = frozenset()
 
 
 def reason(error: Exception) -> str:

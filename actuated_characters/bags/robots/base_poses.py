@@ -21,7 +21,7 @@ _POSES = tuple(
     f"geometry_msgs/msg/{name}"
     for name in ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Pose")
 )
-_WANTED = ("goal", "target", "cmd", "command", "desired", "setpoint", "initialpose")
+_WORDS_OF_A_GOAL = ("goal", "target", "cmd", "command", "desired", "setpoint", "initialpose")
 _MOST_FRAMES = 64  # frames from the base up to the world
 _LEAST_NORM = 1e-6  # least norm of a quaternion that is taken for an orientation
 
@@ -108,7 +108,7 @@ class BaseMotion:
     """Where the base is, as a sum of tracks from the world to a frame that is fixed to it."""
 
     source: str  # the topic that the poses come from
-    tracks: tuple[PoseTrack, ...]  # in their order, the first one in the world
+    tracks: tuple[PoseTrack, ...]  # the chain of poses, the first one in the world
     frame: Pose  # pose of the last track's frame in the base
     remark: str = ""
 
@@ -187,7 +187,7 @@ def _nearest(names: Sequence[str], beside: str) -> list[str]:
 
 def _is_wanted(name: str) -> bool:
     """Whether a topic says where something should be, and not where it is."""
-    return any(word in name.lower() for word in _WANTED)
+    return any(word in name.lower() for word in _WORDS_OF_A_GOAL)
 
 
 def _of_topic(bag: Path, topic: str, kind: str, frames: Mapping[str, Pose]) -> BaseMotion | None:

@@ -30,7 +30,7 @@ from msgs_config.geometry import rotations
 
 _TEXT = "std_msgs/msg/String"
 _DESCRIPTION = "robot_description"
-_USUAL = "joint_states"
+_USUAL_TOPIC = "joint_states"
 _LEFT_OUT = "left out"  # words in those of a character's warnings that concern what is seen
 
 
@@ -127,7 +127,7 @@ def _joint_topic(bag: Path, types: Mapping[str, str], given: str | None) -> str:
         raise RecordingError(
             f"bag {bag} has no joint states: no topic is a {JOINT_STATE}; its topics: {others}"
         )
-    for usual in (f"/{_USUAL}", _USUAL):
+    for usual in (f"/{_USUAL_TOPIC}", _USUAL_TOPIC):
         if usual in found:
             return usual
     if len(found) > 1:

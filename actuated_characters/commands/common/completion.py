@@ -50,8 +50,9 @@ def _scenes(prefix: str, **ignored: object) -> Iterable[str]:
 
 def _settings(parsed_args: argparse.Namespace, **ignored: object) -> Iterable[str]:
     from actuated_characters.commands.common.settings import CHARACTER, NODES, parameters_of
+    from msgs_config.character.loading import load_character
 
-    character = getattr(parsed_args, "character", CHARACTER)
+    character = load_character(getattr(parsed_args, "character", CHARACTER))
     return [
         f"{node}.{parameter.name}:="
         for node in NODES

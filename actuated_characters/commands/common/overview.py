@@ -20,7 +20,8 @@ OVERVIEW = {
     "run --view --clip dance_a": "any run in the browser",
     "run --clip backflip --duration 1.75 --planner predictive": "by joint torques "
     "alone; needs the extra 'plan'",
-    "run --help": "all that can be set",
+    "run --parameters controller_node": "all that --set can set of a node",
+    "run --help": "all options",
 }
 
 
@@ -29,7 +30,8 @@ def print_overview(options: argparse.Namespace) -> None:
     from actuated_characters.scenes.scene import load_scene, scene_names
 
     del options
-    print_characters(Console())
+    columns = ("name", "degrees of freedom", "mass", "clips")
+    Console().print(make_table("characters", columns, _characters(), right=False))
     print("\nscenes:")
     for name in scene_names():
         print(f"  {name}: {load_scene(name).title}")
@@ -37,12 +39,6 @@ def print_overview(options: argparse.Namespace) -> None:
     program = typed if Path(typed).name == _PROGRAM else _PROGRAM
     for words, about in OVERVIEW.items():
         print(f"\n# {about}\n{program} {words}")
-
-
-def print_characters(console: Console) -> None:
-    """Print the characters that come with the package, and their clips."""
-    columns = ("name", "degrees of freedom", "mass", "clips")
-    console.print(make_table("characters", columns, _characters(), right=False))
 
 
 def _characters() -> Sequence[tuple[str, ...]]:

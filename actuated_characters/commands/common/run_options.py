@@ -15,9 +15,9 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     tracked = run.add_mutually_exclusive_group()
     tracked.add_argument(
         "--clip",
-        help="track this motion clip: a name or a file. One by `reconstruct` brings the length, "
-        "the parameters and the pushes that it was found with; --duration, --set and --push take "
-        "precedence",
+        help="track this motion clip: a name or a file. One by `motion reconstruct` brings the "
+        "length, the parameters and the pushes that it was found with; --duration, --set and "
+        "--push take precedence",
     )
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"

@@ -151,16 +151,14 @@ def bring_parameters(
     return found
 
 
-def parameters_of(node: str, character_name: str) -> "list[Parameter]":
+def parameters_of(node: str, character: "Character") -> "list[Parameter]":
     """The parameters of a node by its name; `recorder` has the same for all characters."""
     from actuated_characters.recorder import parameters as recorder
     from controller_node import parameters as controller
-    from msgs_config.character.loading import load_character
     from sim_node import parameters as simulator
 
     if node == "recorder":
         return recorder.PARAMETERS
-    character = load_character(character_name)
     if node == "sim_node":
         own = simulator.character_parameters(character)
         return [simulator.CHARACTERS, *simulator.PARAMETERS, *own]

@@ -25,15 +25,13 @@ from msgs_config.geometry.surface import Surface
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
-_NEAR_PLANE, _FAR_PLANE = (
-    0.02,
-    50.0,
-)  # in view distances: what is nearer or farther is not drawn
+# In view distances: what is nearer or farther is not drawn.
+_NEAR_PLANE, _FAR_PLANE = 0.02, 50.0
 _LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
 _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
 _BALL_COLOR = (0.25, 0.25, 0.28, 1.0)
-_NOWHERE = (0.0, 0.0, -1e6)  # m, where no view looks
+_OUT_OF_VIEW = (0.0, 0.0, -1e6)  # m, where no view looks
 
 
 class Drawing(NamedTuple):
@@ -78,7 +76,7 @@ class RenderScene:
         hidden = [body for _, body, _ in self._links] + [body for _, body in self._balls]
         hidden += [] if self._terrain is None else [self._terrain[0]]
         for body in hidden:
-            self._put(body, _NOWHERE)
+            self._put(body, _OUT_OF_VIEW)
         self._remove(self._arrows)
         self._arrows = []
 
@@ -87,7 +85,7 @@ class RenderScene:
         for row, body, own_color in self._links:
             origin, turn_xyzw = frames[0][row], frames[1][row]
             if np.isnan(origin).any():
-                self._put(body, _NOWHERE)
+                self._put(body, _OUT_OF_VIEW)
             else:
                 self._put(body, origin, turn_xyzw)
             red, green, blue, _ = colors[row] or own_color
@@ -144,7 +142,8 @@ class RenderScene:
         color = np.reshape(rgba, (rows, columns, 4))[:, :, :3].astype(np.float32)
         seen: IntArray = np.reshape(bodies, (rows, columns))
         stored: Samples = np.reshape(depths, (rows, columns))
-        depth: Samples = far * near / (far - (far - near) * stored)  # as graphics cards store it
+        # The inverse of what graphics cards store.
+        depth: Samples = far * near / (far - (far - near) * stored)
         depth[seen < 0] = np.inf
         casting = [body for _, body, _ in self._links] + [body for _, body in self._balls]
         return Drawing(color, depth, np.isin(seen, casting))

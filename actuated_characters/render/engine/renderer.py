@@ -34,7 +34,7 @@ class FrameSpec:
     """What one picture shows, of characters of n degrees of freedom and l links in all."""
 
     position: FloatArray  # (n,), message form
-    view: CameraPose = _DEFAULT_VIEW  # where it is seen from
+    view: CameraPose = _DEFAULT_VIEW  # the camera's
     ghost: FloatArray | None = None  # (n,): transparent copies; NaN for a character without one
     ghost_offset: Vector = (0.0, 0.0, 0.0)  # m, world: how far from its place a ghost is drawn
     forces: Sequence[LinkForce] = ()

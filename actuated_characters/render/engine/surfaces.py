@@ -10,7 +10,7 @@ from msgs_config.geometry.surface import Surface
 
 HEAD_WIDTH = 3.0  # width of an arrow's head, in diameters of its shaft
 
-_AROUND = 24  # faces around the axis
+_FACES_AROUND_AXIS = 24  # faces around the axis
 _ALONG_ARC = 7  # points of a quarter of a circle
 
 
@@ -31,7 +31,7 @@ def round_surface(shape: Shape) -> Surface:
 def arrow_surface(length: float, radius: float) -> Surface:
     """The surface of an arrow from the origin along z; the radius is that of its shaft, in m."""
     wide = HEAD_WIDTH * radius
-    neck = length - min(2.0 * wide, 0.6 * length)  # where the arrow's head begins
+    neck = length - min(2.0 * wide, 0.6 * length)  # the arrow's head begins here
     return _polygon_revolved(
         [(0.0, 0.0), (radius, 0.0), (radius, neck), (wide, neck), (0.0, length)]
     )
@@ -48,7 +48,7 @@ def _polygon_revolved(corners: Sequence[tuple[float, float]]) -> Surface:
 
 def _revolved(points: FloatArray, normals: FloatArray) -> Surface:
     """A profile turned about z: distances from the axis and heights (m, 2), from below upwards."""
-    angle = np.linspace(0.0, 2.0 * np.pi, _AROUND + 1)[:, np.newaxis]
+    angle = np.linspace(0.0, 2.0 * np.pi, _FACES_AROUND_AXIS + 1)[:, np.newaxis]
 
     def turned(line: FloatArray) -> FloatArray:
         across, upwards = line.T
@@ -56,7 +56,7 @@ def _revolved(points: FloatArray, normals: FloatArray) -> Surface:
         return np.stack((x, y, np.broadcast_to(upwards, x.shape)), axis=-1).reshape(-1, 3)
 
     count = len(points)
-    column, row = np.mgrid[:_AROUND, : count - 1].reshape(2, -1)
+    column, row = np.mgrid[:_FACES_AROUND_AXIS, : count - 1].reshape(2, -1)
     corner = column * count + row
     beside, above = corner + count, corner + 1
     faces = [(corner, beside, beside + 1), (corner, beside + 1, above)]

@@ -7,30 +7,37 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.replay.comparison import EFFORT, POSITION, VELOCITY, clock_of
+from actuated_characters.replay.comparison import (
+    EFFORT,
+    POSITION,
+    VELOCITY,
+    clock_of,
+    first_tick_of,
+)
 from actuated_characters.replay.players.controller_parameters import reset_changes
 from actuated_characters.replay.players.player import Player
 from actuated_characters.replay.players.simulator_inputs import SimulatorInputs, make_inputs
 from actuated_characters.replay.world import read_world
 from msgs_config.arrays import FloatArray
 from msgs_config.bus.composition import Turns, ros_node
-from msgs_config.bus.node import BusNode
+from msgs_config.bus.node import BusNode, declared_settings
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
-from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import SESSION, given_session, read_session
+from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.parameters import Parameter, resolve
+from msgs_config.settings import Settings, parameter
 
-PARAMETERS = [
-    Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter("world", 0, "which of the bag's worlds to play, counted from 0"),
-    Parameter("states", "states.npz", "where the states go that come back"),
-    SESSION,
-]
+
+class RecordedControllerSettings(Settings):
+    """Which recording is played, and where what comes back goes."""
+
+    recording: str = parameter("", "the bag, or the directory of its run")
+    world: int = parameter(0, "which of the bag's worlds to play, counted from 0")
+    states: str = parameter("states.npz", "where the states go that come back")
+    session: GivenSession = GivenSession()
 
 
 class RecordedController(Player):
@@ -45,14 +52,14 @@ class RecordedController(Player):
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be played.
         """
         super().__init__(node or ros_node("player"))
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        self._file = Path(values.text("states"))
-        world, _ = read_world(Path(values.text("recording")), values.integer("world"))
+        settings = declared_settings(self.node, RecordedControllerSettings)
+        self._file = Path(settings.states)
+        world, _ = read_world(Path(settings.recording), settings.world)
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
+        self._first_tick = first_tick_of(world[0])
         self._simulator = self.node.client(topics.SIM_NODE, {"reset": False})
         self._changes = reset_changes(world)
-        session = given_session(values)
+        session = settings.session.id
         self._throw_codec = ThrowCodec(session)
         self._throw_topic = self.node.publisher(topics.THROW)
         inputs = make_inputs(world)
@@ -75,7 +82,7 @@ class RecordedController(Player):
             )
             while not self.stop and self._played <= self._ticks:
                 yield from self.wait(
-                    self._has_states, lambda: f"the state of tick {FIRST_TICK + self._played}"
+                    self._has_states, lambda: f"the state of tick {self._first_tick + self._played}"
                 )
                 if self._played < self._ticks and not self.stop:
                     yield from self._replay_tick(self._played)
@@ -116,10 +123,12 @@ class RecordedController(Player):
         """Send what was thrown as a tick began; returns when the simulator has it."""
         throws = self._throws[tick] if self._throws else ()
         for throw in throws:
-            stamp_ns = self._tick_clock.stamp_ns(FIRST_TICK + tick)
+            stamp_ns = self._tick_clock.stamp_ns(self._first_tick + tick)
             self._throw_topic.publish(self._throw_codec.encode(stamp_ns, throw))
         if throws:
-            self.acknowledge(self._throw_topic, f"what was thrown at tick {FIRST_TICK + tick}")
+            self.acknowledge(
+                self._throw_topic, f"what was thrown at tick {self._first_tick + tick}"
+            )
 
     def _arrays(self) -> dict[str, FloatArray]:
         """What has come back: `position_0` (m, n) and so on, of each character."""
@@ -149,6 +158,7 @@ class _CharacterTopics:
         self.size = recording.layout.size
         self._inputs, self._session = inputs, session
         self._layout, self._clock = recording.layout, clock_of(recording)
+        self._first_tick = first_tick_of(recording)
         self._decoder = JointStateDecoder()
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
         self._torques = node.publisher(topics.JOINT_TORQUES.under(name))
@@ -165,7 +175,7 @@ class _CharacterTopics:
         state = self._next_state()
         if state is None:
             return False
-        expected = self._clock.stamp_ns(FIRST_TICK + len(self.states))
+        expected = self._clock.stamp_ns(self._first_tick + len(self.states))
         if state.stamp_ns == expected:
             self.states.append(state)
         elif state.stamp_ns > expected:
@@ -191,14 +201,14 @@ class _CharacterTopics:
         """
         push = self._inputs.pushes[tick]
         if push is not None:
-            stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
+            stamp_ns = self._clock.stamp_ns(self._first_tick + tick)
             own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
-            Player.acknowledge(self._wrenches, f"the push of tick {FIRST_TICK + tick}")
+            Player.acknowledge(self._wrenches, f"the push of tick {self._first_tick + tick}")
 
     def command(self, tick: int) -> None:
         """Send what was commanded in a tick."""
-        stamp_ns = self._clock.stamp_ns(FIRST_TICK + tick)
+        stamp_ns = self._clock.stamp_ns(self._first_tick + tick)
         self.last_sent = [
             self._encoder(each.names).encode(stamp_ns, effort=each.efforts)
             for each in self._inputs.commands[tick]

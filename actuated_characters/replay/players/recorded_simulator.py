@@ -21,7 +21,7 @@ from actuated_characters.replay.players.simulator_outputs import (
 )
 from msgs_config.arrays import BoolArray
 from msgs_config.bus.composition import Turns, ros_node
-from msgs_config.bus.node import BusNode
+from msgs_config.bus.node import BusNode, declared_settings
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.errors import MessageError, RecordingError
 from msgs_config.messages import topics
@@ -29,29 +29,30 @@ from msgs_config.messages.cdr import encode_clock
 from msgs_config.messages.joint_state import JointStateDecoder
 from msgs_config.messages.session import (
     ANONYMOUS,
-    SESSION,
-    given_session,
+    GivenSession,
     make_session,
     read_session,
 )
 from msgs_config.messages.topic import Topic
-from msgs_config.parameters import Parameter, resolve
+from msgs_config.settings import Settings, parameter
 
-PARAMETERS = [
-    Parameter("recording", "", "the bag, or the directory of its run"),
-    Parameter("character", "", "name of the recording to play, where there are several"),
-    Parameter("commands", "commands.npz", "where the commands go that answer the states"),
-    Parameter(
-        "repeat_requests",
+
+class RecordedSimulatorSettings(Settings):
+    """Which recording is played, and where what answers it goes."""
+
+    recording: str = parameter("", "the bag, or the directory of its run")
+    character: str = parameter("", "name of the recording to play, where there are several")
+    commands: str = parameter("commands.npz", "where the commands go that answer the states")
+    repeat_requests: bool = parameter(
         True,
         "repeat what the controller was asked for then: parameters, trajectories and strengths",
-    ),
-    Parameter(
-        "fixed", [], "parameters of controller_node that are not changed as they were", texts=True
-    ),
-    SESSION,
-    Parameter("start_timeout", ANSWER_TIMEOUT, "for a controller; 0: no limit", unit="s"),
-]
+    )
+    fixed: tuple[str, ...] = parameter(
+        (), "parameters of controller_node that are not changed as they were"
+    )
+    session: GivenSession = GivenSession()
+    start_timeout: float = parameter(ANSWER_TIMEOUT, "for a controller; 0: no limit", unit="s")
+
 
 _REPUBLISH_PERIOD = 0.5  # s, as the simulator's
 
@@ -68,14 +69,13 @@ class RecordedSimulator(Player):
             ActuatedCharactersError: a parameter is wrong, or the recording cannot be played.
         """
         super().__init__(node or ros_node(topics.SIM_NODE))
-        values = resolve(PARAMETERS, self.node.given_parameters())
-        self.node.declare(PARAMETERS, values)
-        self._file = Path(values.text("commands"))
-        self._session = given_session(values) or make_session(self.node.get_fully_qualified_name())
+        settings = declared_settings(self.node, RecordedSimulatorSettings)
+        self._file = Path(settings.commands)
+        self._session = settings.session.id or make_session(self.node.get_fully_qualified_name())
         self._rewriter = SessionRewriter(self._session)
-        self._path = path = Path(values.text("recording"))
-        self._start_timeout = values.number("start_timeout") or math.inf
-        self._recording = read_recording(path, values.text("character") or None)
+        self._path = path = Path(settings.recording)
+        self._start_timeout = settings.start_timeout or math.inf
+        self._recording = read_recording(path, settings.character or None)
         self._rare = read_rare_messages(path, self._recording)
         self._ticks = read_ticks(path, self._recording)
         recorded = ~np.isnan(recorded_commands(self._recording))  # (t + 1, n)
@@ -83,9 +83,8 @@ class RecordedSimulator(Player):
             raise RecordingError(f"recording {path} has no commands to compare others with")
         self._received = np.full(recorded.shape, np.nan)
         self._awaited = recorded | _needed_commands(self._recording)
-        self._repeats = values.flag("repeat_requests")
-        fixed = values.texts("fixed")
-        self._changes = parameter_changes(self._recording, fixed) if self._repeats else {}
+        self._repeats = settings.repeat_requests
+        self._changes = parameter_changes(self._recording, settings.fixed) if self._repeats else {}
         self._is_realtime = self._recording.parameters.get("mode") == "realtime"
         self._decoder, self._once_logger = JointStateDecoder(), OnceLogger(self.node.get_logger())
         self._open_topics()

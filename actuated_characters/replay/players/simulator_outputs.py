@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.reader import read_messages, read_topics
 from actuated_characters.bags.recording import Recording, find_bag, read_recording
 from msgs_config.arrays import IntArray
 from msgs_config.errors import RecordingError
@@ -37,6 +37,7 @@ _ACCEPTED = tuple(  # what the controller publishes of each request that it has 
     if topic.name == request.accepted_on
 )
 _CONFIGURATION = topics.CONFIGURATION.of(topics.SIM_NODE)
+_OF_SIMULATOR = (_CONFIGURATION, topics.EPISODE)
 
 
 @dataclass
@@ -153,7 +154,8 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
     """
     rare, by_topic = RareMessages(), dict[str, list[tuple[int, bytes]]]()
     types = {_name(recording, topic): topic.type_name for topic in (*REQUESTS, *_ACCEPTED)}
-    for message in read_messages(find_bag(path)):
+    bag, names = find_bag(path), {*types, *(_name(recording, each) for each in _OF_SIMULATOR)}
+    for message in read_messages(bag, names & read_topics(bag).keys()):
         if message.topic == _name(recording, _CONFIGURATION):
             since_ns = json.loads(decode_string(message.raw)).get(SINCE)
             row = 0 if since_ns is None else np.searchsorted(recording.stamps_ns, since_ns, "right")
@@ -173,7 +175,8 @@ def read_rare_messages(path: Path, recording: Recording) -> RareMessages:
         sent = by_topic.get(_name(recording, active)) or by_topic.get(_name(recording, topic), [])
         for published_ns, raw in sent:
             row = _row(recording.stamps_ns, answered, published_ns, _raw_stamp_ns(raw))
-            if row is not None:
+            # a keyframe has what was accepted up to its answer
+            if row is not None and (row or recording.keyframe is None):
                 rare.requests.setdefault(row, []).append((topic.name, raw))
     return rare
 

@@ -9,14 +9,14 @@ import numpy as np
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.arrays import FloatArray
-from sim_node.physics.sphere_sweep import BallAndCharacter
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.balls.sphere_sweep import BallAndCharacter
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 from sim_node.simulation_factory import make_simulation_settings
 
 _LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character
-_NEAR_DISTANCE = (
-    5e-3  # m between surfaces that have just touched, and half of what the ball moves in a tick
-)
+# So far, m, beside half of what the ball moves in a tick, are surfaces that have just touched.
+_NEAR_DISTANCE = 5e-3
 _PUT_AWAY = 100.0  # m in a tick: the end of `ball_lifetime`
 
 States: TypeAlias = list[tuple[FloatArray, FloatArray]]

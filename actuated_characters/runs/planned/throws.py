@@ -18,8 +18,8 @@ from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from msgs_config.shared_parameters import PLANE
-from sim_node.physics.sphere_sweep import find_impact
-from sim_node.physics.throws import MOST_BALLS
+from sim_node.physics.balls.sphere_sweep import find_impact
+from sim_node.physics.balls.throws import MOST_BALLS
 
 SIDES: Mapping[str, float | None] = {
     "front": 0.0,
@@ -30,10 +30,10 @@ SIDES: Mapping[str, float | None] = {
 }
 """Angles in degrees about the vertical, counterclockwise from the way that the character faces."""
 
-_NEEDED = ("mass", "speed", "at", "target")
-_TEXTS = ("target", "from")
-_KEYS = (*_NEEDED, "from", "distance", "radius")
-_SLOWEST = 1e-3  # m/s
+_REQUIRED_KEYS = ("mass", "speed", "at", "target")
+_TEXT_KEYS = ("target", "from")
+_KEYS = (*_REQUIRED_KEYS, "from", "distance", "radius")
+_MIN_SPEED = 1e-3  # m/s
 _EXAMPLE = "mass=2 speed=8 at=2.0 from=left target=chest"
 
 
@@ -52,7 +52,7 @@ class ThrowRequest:
     speed: float  # m/s, along the straight way to the target
     at: float  # s since the first state: when it hits
     target: str  # a link
-    side: str = "front"  # of `SIDES`, or an angle as they have it, degrees
+    side: str = "front"  # one of `SIDES`, or an angle as they have it, degrees
     distance: float = 2.0  # m, from the link's centre of mass to where the ball is let go
     radius: float | None = None  # m; None: of a density that balls have
 
@@ -61,9 +61,9 @@ class ThrowRequest:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ConfigurationError(f"{name} is {value:g}; it must be above 0")
-        if self.speed < _SLOWEST:
+        if self.speed < _MIN_SPEED:
             raise ConfigurationError(
-                f"speed is {self.speed:g} m/s; it must be {_SLOWEST:g} m/s or more"
+                f"speed is {self.speed:g} m/s; it must be {_MIN_SPEED:g} m/s or more"
             )
 
     @property
@@ -88,13 +88,13 @@ def parse_throw(text: str) -> ThrowRequest:
         if key in given:
             raise ConfigurationError(f"'{key}' twice")
         given[key] = value
-    missing = [key for key in _NEEDED if key not in given]
+    missing = [key for key in _REQUIRED_KEYS if key not in given]
     if missing:
         raise ConfigurationError(f"'{missing[0]}' is missing; write it as '{_EXAMPLE}'")
     side = given.get("from", ThrowRequest.side)
     if side not in SIDES:
         _number("from", side, f"an angle in degrees, or one of {', '.join(SIDES)}")
-    numbers = {key: _number(key, value) for key, value in given.items() if key not in _TEXTS}
+    numbers = {key: _number(key, value) for key, value in given.items() if key not in _TEXT_KEYS}
     return ThrowRequest(target=given["target"], side=side, **numbers)
 
 
@@ -119,7 +119,7 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
             the ball to arrive, or the ball would touch the ground before.
         CommandError: a ball like that cannot be thrown.
     """
-    rate, size = plan.simulator.integer("rate"), request.size
+    rate, size = plan.simulation.rate_hz, request.size
     end = plan.ticks / rate
     if not 0.0 <= request.at < end:
         raise ConfigurationError(f"at is {request.at:g} s; it must be 0 s to less than {end:g} s")
@@ -135,10 +135,10 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
             f"the ball needs {ticks / rate:.3g} s to '{request.target}': let it hit later, or come "
             "from nearer"
         )
-    time, step = ticks / rate, 1.0 / (rate * plan.simulator.integer("substeps"))
+    time, step = ticks / rate, 1.0 / (rate * plan.simulation.substeps)
     start = impact.centre + request.speed * time * origin
     # the engine's fall: it moves on with the velocity at the end of each of its steps
-    rise = 0.5 * plan.simulator.number("gravity") * (time + step)
+    rise = 0.5 * plan.simulation.world.gravity * (time + step)
     velocity = -request.speed * origin + np.array((0.0, 0.0, rise))
     _check_ground(plan, request, min(float(start[2]), float(impact.centre[2])) - size)
     throw = ProjectileThrow(request.mass, size, _triple(start), _triple(velocity))
@@ -147,7 +147,7 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
 
 def _check_ground(plan: RunPlan, request: ThrowRequest, lowest: float) -> None:
     """Raise ConfigurationError if the lowest point of a ball's way, m, is in the ground."""
-    if plan.simulator.text("terrain") == PLANE and lowest < 0.0:
+    if plan.simulation.terrain == PLANE and lowest < 0.0:
         raise ConfigurationError(
             f"a ball with a radius of {request.size:.3g} m on its way to '{request.target}' would "
             f"be {-lowest:.2g} m in the ground; take a smaller 'radius', or another 'from'"

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.files import Planned, read_planned
-from controller_node.behaviours.state_machine.factory import STATE_MACHINE
+from controller_node.behaviours.factory import BehaviourSettings
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.errors import ConfigurationError
@@ -50,7 +51,7 @@ def plan_velocities(plan: RunPlan, text: str) -> tuple[RunPlan, list[PlannedVelo
         ConfigurationError: the text is not of that form, a time is beyond the run or not after the
             one before, the reference is not steered, or a velocity is beyond its limits.
     """
-    reference, rate = plan.reference, plan.simulator.integer("rate")
+    reference, rate = plan.reference, plan.simulation.rate_hz
     if not isinstance(reference, SteeredReference):
         raise ConfigurationError("--cmd-vel steers; it goes with --reference steered")
     commands = [_parse(part, rate) for part in text.split()]
@@ -89,7 +90,7 @@ def _parse(text: str, rate_hz: int) -> VelocityCommand:
 
 def _check_times(plan: RunPlan, commands: Sequence[VelocityCommand]) -> None:
     """Raise ConfigurationError unless there are commands, in order and within the run."""
-    rate = plan.simulator.integer("rate")
+    rate = plan.simulation.rate_hz
     if not commands:
         raise ConfigurationError(
             f"--cmd-vel has no velocity; write one or more, such as {_EXAMPLE}"
@@ -112,17 +113,17 @@ def _allowed(
     Raises:
         ConfigurationError: one is beyond the limits, and no machine goes.
     """
-    rate, warnings = plan.simulator.integer("rate"), []
+    rate, warnings = plan.simulation.rate_hz, []
     allowed = [reference.limits.clamped(command) for command in commands]
     for asked, taken in zip(commands, allowed, strict=True):
         if asked == taken:
             continue
         beyond = f"--cmd-vel: {_text(asked)} at {asked.tick / rate:g} s is more than"
-        if plan.controller.text("behaviour") != STATE_MACHINE:
+        if BehaviourSettings.of(plan.controller).behaviour != STATE_MACHINE:
             raise ConfigurationError(
                 f"{beyond} it can, which is at most {_text(taken)} (see controller_node.steering.*)"
             )
-        machine = plan.controller.text("machine")
+        machine = MachineSettings.of(plan.controller).machine
         warnings.append(f"{beyond} the machine {machine} takes; it is taken as {_text(taken)}")
     return allowed, tuple(warnings)
 

@@ -11,7 +11,7 @@ from actuated_characters.runs.planned.files import Planned, read_planned
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays
-from sim_node.node_settings import make_node_settings
+from sim_node.node_settings import NodeSettings
 from sim_node.physics.wrenches import WrenchQueue
 
 
@@ -36,7 +36,7 @@ def read_pushes(file: Path) -> list[PlannedPush]:
 
 def push_schedule(plan: RunPlan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
     """The pushes of a plan as its simulator takes them, without topics."""
-    schedule, clock = WrenchQueue(plan.character), TickClock(plan.simulator.integer("rate"))
+    schedule, clock = WrenchQueue(plan.character), TickClock(plan.simulation.rate_hz)
     for push in pushes:
         content = push.arrays()
         schedule.add(
@@ -44,7 +44,7 @@ def push_schedule(plan: RunPlan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
             content.wrenches,
             content.points,
             first_tick=clock.first_tick_from(push.stamp_ns),
-            ticks=make_node_settings(plan.simulator).push_ticks,
+            ticks=NodeSettings.of(plan.simulator).push_ticks,
         )
     return schedule
 
@@ -64,7 +64,7 @@ def parse_pushes_within(texts: Sequence[str], plan: RunPlan) -> list[PlannedPush
     Raises:
         ConfigurationError: as `parse_push`.
     """
-    rate = plan.simulator.integer("rate")
+    rate = plan.simulation.rate_hz
     return [
         plan_push(plan, link, force, time)
         for link, force, time in map(_split, texts)
@@ -96,7 +96,7 @@ def plan_push(
             the run.
     """
     links = [link.name for link in plan.character.links]
-    rate = plan.simulator.integer("rate")
+    rate = plan.simulation.rate_hz
     if link not in links:
         raise ConfigurationError(f"push: {one_of('link', link, links)}")
     if not all(math.isfinite(value) for value in force):

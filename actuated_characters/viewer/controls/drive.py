@@ -22,10 +22,8 @@ from msgs_config.messages import topics, typed
 
 _WALK, _RUN, _BACK, _TURN = 1.0, 2.2, -0.4, 0.8  # m/s and rad/s that keys ask for
 _PERIOD = 0.1  # s between two velocities
-_FIRST_PRESS, _REPEATED_PRESS = (
-    0.7,
-    0.4,
-)  # s that a press lasts: systems begin to repeat after up to 0.66 s
+# A press lasts so long, s: systems begin to repeat it after up to 0.66 s.
+_FIRST_PRESS, _REPEATED_PRESS = 0.7, 0.4
 _SEARCH_PERIOD = 1.0  # s between looks for a controller that is steered
 _HELP = (
     "**↑ ↓ ← →** walk and turn, with **Shift** run, **space** stops. When the keys, or the button, "
@@ -145,7 +143,7 @@ class DrivingControls:
         if self._publisher is None or now < self._next_velocity:
             return
         velocity = self._input.velocity if now < self._input.until else Velocity()
-        if self._moves or velocity != Velocity():  # of several zeros only the first is sent
+        if self._moves or velocity != Velocity():  # only the first of several zeros is sent
             self._publisher.publish(velocity.encode())
             self._next_velocity = now + _PERIOD
         self._moves = velocity != Velocity()

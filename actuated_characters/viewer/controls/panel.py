@@ -16,7 +16,11 @@ from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
-from actuated_characters.viewer.controls.shown_parameters import CONTROLLER, SIMULATOR, Shown
+from actuated_characters.viewer.controls.shown_parameters import (
+    CONTROLLER,
+    SIMULATOR,
+    ShownParameter,
+)
 from actuated_characters.viewer.drawing.drawn_character import SHOWN
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from msgs_config.messages import topics
@@ -25,7 +29,7 @@ _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = "Drag a body to push it. Shift and click throws a ball at it."
 _TEXT_PERIOD = 0.2  # s between texts: the page lays each out
-_NAMELESS = "alone"  # the character of a simulator that has one, without a name
+_NAME_OF_ONLY_CHARACTER = "alone"  # the character of a simulator that has one, without a name
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,13 @@ class Subject:
     simulator: str  # its namespace, which begins with `/` or is empty
     below: str  # the character's own namespace, of the same form
     session: str
-    parameters: Mapping[str, tuple[Shown, ...]] = field(default_factory=dict, compare=False)
+    parameters: Mapping[str, tuple[ShownParameter, ...]] = field(
+        default_factory=dict, compare=False
+    )
     """That the panel has of its nodes, by the titles of folders."""
 
 
-class Panel:
+class ControlPanel:
     """The panel of all clients, about one character of those that there are."""
 
     def __init__(
@@ -60,7 +66,7 @@ class Panel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("no simulator")
-        self._which: Any = gui.add_dropdown("Character", (_NAMELESS,), visible=False)
+        self._which: Any = gui.add_dropdown("Character", (_NAME_OF_ONLY_CHARACTER,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
         self._drive = DrivingControls(node, gui, actions)
@@ -72,7 +78,7 @@ class Panel:
         """A callback of viser that has the node's thread call a function with a value."""
 
         async def change(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # without a client this panel has set it itself
+            if event.client_id is not None:  # an event without a client is this panel's own
                 self._actions.put(partial(function, value()))
 
         return change
@@ -116,7 +122,7 @@ class Panel:
         Shows the time of its newest state, and hands out what nodes have responded.
         """
         self.requests.poll()
-        names = tuple(below.lstrip("/") or _NAMELESS for below in known)
+        names = tuple(below.lstrip("/") or _NAME_OF_ONLY_CHARACTER for below in known)
         if names and names != self._names:
             self._names = names
             self._which.options = names

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from actuated_characters.viewer.controls.requests import Requests
-from actuated_characters.viewer.controls.shown_parameters import AT_RESET, SIMULATOR, Shown
+from actuated_characters.viewer.controls.shown_parameters import AT_RESET, SIMULATOR, ShownParameter
 
 Later = Callable[[Callable[..., None], Callable[[], Any]], Callable[..., Any]]
 
@@ -22,12 +22,12 @@ class ParameterControls:
         self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
         self._nodes: dict[str, str] = {}  # whole names of nodes by those in the contract
         self._prefix = ""  # begins the names of the character's own parameters of its simulator
-        self._shown: Mapping[str, tuple[Shown, ...]] = {}
+        self._shown: Mapping[str, tuple[ShownParameter, ...]] = {}
         self._folders: dict[str, Any] = {}
-        self._controls: dict[str, tuple[Shown, Any]] = {}  # by the parameter's name
+        self._controls: dict[str, tuple[ShownParameter, Any]] = {}  # by the parameter's name
 
     def choose(
-        self, nodes: dict[str, str], name: str, shown: Mapping[str, tuple[Shown, ...]]
+        self, nodes: dict[str, str], name: str, shown: Mapping[str, tuple[ShownParameter, ...]]
     ) -> None:
         """Be about some nodes from now on, and about the parameters of each folder's title.
 
@@ -38,7 +38,7 @@ class ParameterControls:
             self._shown = shown
             self._build()
         for _, handle in self._controls.values():
-            handle.visible = False  # until the node has said that it has the parameter
+            handle.visible = False  # the node has yet to say that it has the parameter
         for folder in self._folders.values():
             folder.visible = False
         self._ask(self._controls)
@@ -58,7 +58,7 @@ class ParameterControls:
                     )
                     self._controls[shown.name] = shown, handle
 
-    def _add(self, shown: Shown) -> Any:
+    def _add(self, shown: ShownParameter) -> Any:
         if shown.options:
             return self._gui.add_dropdown(shown.label, shown.options, visible=False)
         if shown.range is None:
@@ -86,7 +86,7 @@ class ParameterControls:
             )
 
     @staticmethod
-    def _show(shown: Shown, handle: Any, value: Any) -> None:
+    def _show(shown: ShownParameter, handle: Any, value: Any) -> None:
         handle.visible = True
         if shown.options and value not in handle.options:
             handle.options = (*shown.options, value)
@@ -95,14 +95,14 @@ class ParameterControls:
         if handle.value != value:
             handle.value = value
 
-    def _set(self, shown: Shown, value: Any) -> None:
+    def _set(self, shown: ShownParameter, value: Any) -> None:
         if shown.has_no_limit and shown.range is not None and value >= shown.range[1]:
             value = math.inf
         for node in shown.nodes:
             told = partial(self._told, shown, value, node)
             self._requests.set(self._nodes[node], shown.name, value, told)
 
-    def _told(self, shown: Shown, value: object, node: str, reason: str) -> None:
+    def _told(self, shown: ShownParameter, value: object, node: str, reason: str) -> None:
         """Say what a node has said; where it has rejected a value, show the one in force."""
         given = f"{value:g}" if isinstance(value, float) else str(value)
         waits = shown in self._shown.get(AT_RESET, ())

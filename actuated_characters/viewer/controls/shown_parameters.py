@@ -17,7 +17,7 @@ _FORCE, _TORQUE = f"effort_limit.{ROOT}", f"effort_limit.{ROOT_TORQUE}"
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownParameter:
     """A parameter as a menu of its options, a slider, or (with neither) a checkbox."""
 
     name: str
@@ -30,38 +30,44 @@ class Shown:
 
 
 _LAW = (
-    Shown("law", "Law", options=tuple(LAWS)),
-    Shown("gain_scale.p", "Stiffness ×", range=(0.0, 3.0, 0.05)),
-    Shown("gain_scale.d", "Damping ×", range=(0.0, 3.0, 0.05)),
-    Shown(f"effort_limit.{ROOT}", "Root force (N)", range=(0.0, 2000.0, 10.0), has_no_limit=True),
-    Shown(
+    ShownParameter("law", "Law", options=tuple(LAWS)),
+    ShownParameter("gain_scale.p", "Stiffness ×", range=(0.0, 3.0, 0.05)),
+    ShownParameter("gain_scale.d", "Damping ×", range=(0.0, 3.0, 0.05)),
+    ShownParameter(
+        f"effort_limit.{ROOT}", "Root force (N)", range=(0.0, 2000.0, 10.0), has_no_limit=True
+    ),
+    ShownParameter(
         f"effort_limit.{ROOT_TORQUE}",
         "Root torque (N m)",
         range=(0.0, 1000.0, 5.0),
         has_no_limit=True,
     ),
-    Shown("balance.enabled", "Balance"),
-    Shown("balance.stiffness", "Balance (N/m)", range=(0.0, 5000.0, 50.0)),
-    Shown("balance.damping", "Balance (N s/m)", range=(0.0, 1000.0, 10.0)),
+    ShownParameter("balance.enabled", "Balance"),
+    ShownParameter("balance.stiffness", "Balance (N/m)", range=(0.0, 5000.0, 50.0)),
+    ShownParameter("balance.damping", "Balance (N s/m)", range=(0.0, 1000.0, 10.0)),
 )
 _TRACKED_FROM_ITS_START = (
     (CONTROLLER, "reference", "clip"),
     (SIMULATOR, "initial_state", "reference"),
 )
 _WORLD = (
-    Shown("gravity", "Gravity (m/s²)", range=(0.0, 20.0, 0.01), nodes=(SIMULATOR, CONTROLLER)),
-    Shown("friction", "Friction, ground", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
-    Shown("link_friction", "Friction, links", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
+    ShownParameter(
+        "gravity", "Gravity (m/s²)", range=(0.0, 20.0, 0.01), nodes=(SIMULATOR, CONTROLLER)
+    ),
+    ShownParameter("friction", "Friction, ground", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
+    ShownParameter("link_friction", "Friction, links", range=(0.0, 2.0, 0.05), nodes=(SIMULATOR,)),
 )
 
 
-def shown_parameters(character: Character) -> dict[str, tuple[Shown, ...]]:
+def shown_parameters(character: Character) -> dict[str, tuple[ShownParameter, ...]]:
     """Those of a character's nodes, by the titles of the panel's folders."""
-    motion = [Shown("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
+    motion = [ShownParameter("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
     if clips := available_clips(character):
-        motion.insert(0, Shown("clip", "Clip", options=tuple(clips), then=_TRACKED_FROM_ITS_START))
+        motion.insert(
+            0, ShownParameter("clip", "Clip", options=tuple(clips), then=_TRACKED_FROM_ITS_START)
+        )
     strengths = tuple(
-        Shown(f"strength.{name}", name, range=(0.0, 1.0, 0.05))
+        ShownParameter(f"strength.{name}", name, range=(0.0, 1.0, 0.05))
         for name in character.vector_names
         if name not in character.layout.followers
         if name not in (ROOT, ROOT_TORQUE)

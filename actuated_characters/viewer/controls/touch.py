@@ -35,7 +35,7 @@ class Drag:
     below: str  # the namespace of the character
     row: int  # row of the link
     grabbed: FloatArray  # (3,) m, in the link's frame
-    pointer: FloatArray  # (3,) m, as the browser has it
+    pointer: FloatArray  # (3,) m, the browser's
     stamp_ns: int | None = None  # stamp of the state in which the last push was sent
     force: float = 0.0  # N, the present one
     impulse: float = 0.0  # N s, since it began

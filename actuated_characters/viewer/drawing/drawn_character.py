@@ -19,7 +19,7 @@ from msgs_config.character.model import Character, Shape
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
-_STRAINED = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
+_STRAIN_COLOR = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
 _LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
 _GHOST = (90, 120, 220)
 _GHOST_OPACITY = 0.25
@@ -172,7 +172,7 @@ class DrawnCharacter:
                 continue
             self._levels[row] = level
             for mesh, color in zip(self._meshes[row], self._colors[row], strict=True):
-                mesh.color = _rgb(color + (_STRAINED - color) * (level / _LEVELS))
+                mesh.color = _rgb(color + (_STRAIN_COLOR - color) * (level / _LEVELS))
 
     def _draw_balance(self, contacts: WrenchArrays | None) -> None:
         """Draw the centre of mass, the point below it, and the support polygon."""

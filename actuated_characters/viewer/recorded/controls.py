@@ -10,7 +10,7 @@ from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.drawing.drawn_character import SHOWN
 from actuated_characters.viewer.drawing.scene import BrowserScene
-from actuated_characters.viewer.recorded.timeline import Timeline
+from actuated_characters.viewer.recorded.timeline import Playback
 
 NO_GHOST, REFERENCE = "none", "reference"
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
@@ -19,7 +19,7 @@ _PNG, _MP4, _CANCEL = "PNG", "MP4", "Cancel"
 _OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
 
 
-class Shown(Protocol):
+class PanelTarget(Protocol):
     """What the panel acts on; its methods are called in the player's own thread."""
 
     def save_picture(self, client: viser.ClientHandle) -> None:
@@ -42,9 +42,9 @@ class RecordedPanel:
         self,
         gui: viser.GuiApi,
         scene: BrowserScene,
-        timeline: Timeline,
+        timeline: Playback,
         actions: ActionQueue,
-        shown: Shown,
+        shown: PanelTarget,
     ) -> None:
         self._gui, self._scene, self._timeline = gui, scene, timeline
         self._actions, self._shown = actions, shown
@@ -66,7 +66,7 @@ class RecordedPanel:
         """Have the player's thread call a function with a control's value when a client sets it."""
 
         async def change(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # without a client this panel has set it itself
+            if event.client_id is not None:  # an event without a client is this panel's own
                 self._actions.put(partial(act, handle.value))
 
         (handle.on_click if click else handle.on_update)(change)

@@ -20,7 +20,7 @@ from actuated_characters.viewer.recorded.export import (
 from actuated_characters.viewer.recorded.forking import Fork
 from actuated_characters.viewer.recorded.plots import Plots, curves
 from actuated_characters.viewer.recorded.run import RecordedRun, check_comparable, read_run
-from actuated_characters.viewer.recorded.timeline import Timeline, frame_times
+from actuated_characters.viewer.recorded.timeline import Playback, frame_times
 from actuated_characters.viewer.web.rejections import Rejections
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
@@ -37,7 +37,7 @@ class RecordedPlayer:
         """Build the scene; raises CharacterError if a mesh cannot be used."""
         self._server, self._run = server, run
         self._ghosts = {_name(other, run): other for other in others}
-        self._timeline = Timeline(run.times)
+        self._timeline = Playback(run.times)
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
         self._drawn = [

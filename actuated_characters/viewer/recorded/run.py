@@ -7,7 +7,7 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.robots.reading import RobotSource, read_any
-from actuated_characters.render.scene import Scene, make_scene
+from actuated_characters.render.scene import RecordedScene, make_scene
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.recorded.timeline import row_at
 from msgs_config.arrays import FloatArray
@@ -21,7 +21,7 @@ class RecordedRun:
     """The characters of one world of a recording, over the ticks that there are of all."""
 
     path: Path
-    scene: Scene
+    scene: RecordedScene
 
     @property
     def name(self) -> str:

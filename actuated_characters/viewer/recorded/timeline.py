@@ -7,7 +7,7 @@ from msgs_config.arrays import FloatArray
 _EQUAL_TIMES = 1e-9  # s: two times are as good as equal
 
 
-class Timeline:
+class Playback:
     """A position among the states of a recording, which plays at a speed, or stands."""
 
     def __init__(self, times: FloatArray) -> None:

@@ -40,9 +40,9 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-store",  # else a page that came without these headers could be shown again
+    "Cache-Control": "no-store",  # or a page that came without these headers could be shown again
 }
-_STARTING = "the viewer starts; this page comes again by itself\n"
+_STARTING_PAGE = "the viewer starts; this page comes again by itself\n"
 
 Serve = Callable[[ServerConnection, Request], Response | None]
 """viser's own answer to a request; None where it takes the connection as a websocket."""
@@ -106,7 +106,7 @@ class ServerGate:
         if max(map(len, request.path.partition("?")[0].split("/"))) > _MOST_SEGMENT:
             return respond(HTTPStatus.NOT_FOUND, "there is no such page\n")
         if self._messages is None:
-            response = respond(HTTPStatus.SERVICE_UNAVAILABLE, _STARTING)
+            response = respond(HTTPStatus.SERVICE_UNAVAILABLE, _STARTING_PAGE)
             response.headers["Retry-After"] = "1"
             response.headers["Refresh"] = "1"
             return response

@@ -16,16 +16,16 @@ import viser
 from viser import _messages as wire
 
 _MOST_TEXT = 1000  # characters of a text field
-_MOST_PIXELS = 1 << 14  # of a window's width or height
+_MOST_PIXELS = 1 << 14  # the most that a window is wide or high
 _MOST_AREA = 1 << 25  # pixels of a picture: a small file may have very many
-_FARTHEST = 1e6  # m, or pixels: what is farther comes from no mouse
-_SLIDER_ROUNDING = 1e-9  # by which a page's slider may miss its own end
-_UNIT_TOLERANCE = 1e-3  # by which the length of a direction may differ from one
+_MAX_COORDINATE = 1e6  # m, or pixels: what is farther comes from no mouse
+_SLIDER_ROUNDING = 1e-9  # a page's slider may miss its own end by this share
+_UNIT_TOLERANCE = 1e-3  # a direction's length may differ from one by this
 _MAX_SHOWN = 60  # characters of a value that a line shows
 _PNG_HEAD = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR"
 
 _Fault = str | None
-_MALFORMED = (msgspec.MsgspecError, OverflowError, ValueError)
+_ERRORS_OF_MALFORMED = (msgspec.MsgspecError, OverflowError, ValueError)
 
 
 class MessageCheck:
@@ -53,7 +53,7 @@ class MessageCheck:
             return "it is text, not msgpack"
         try:
             return self._message_fault(msgspec.msgpack.decode(raw), awaits_picture)
-        except _MALFORMED as error:
+        except _ERRORS_OF_MALFORMED as error:
             return f"it is no msgpack: {error}"
         except RecursionError:
             return "it is nested too deep"
@@ -74,10 +74,10 @@ class MessageCheck:
             return f"{kind.__name__} has no {_shown(unknown[0])}"
         try:
             message: Any = msgspec.convert(content, kind)
-        except _MALFORMED as error:
+        except _ERRORS_OF_MALFORMED as error:
             return f"{kind.__name__}: {error}"
         if kind is not wire.GetRenderResponseMessage and not _is_near(content.values()):
-            return f"{kind.__name__} has a number that is not finite, or beyond {_FARTHEST:g}"
+            return f"{kind.__name__} has a number that is not finite, or beyond {_MAX_COORDINATE:g}"
         fault = self._checks[kind](message)
         return fault and f"{kind.__name__}: {fault}"
 
@@ -167,7 +167,7 @@ def _is_near(values: Iterable[object]) -> bool:
         if isinstance(value, list | tuple):
             if not _is_near(value):
                 return False
-        elif isinstance(value, int | float) and not abs(value) <= _FARTHEST:
+        elif isinstance(value, int | float) and not abs(value) <= _MAX_COORDINATE:
             return False
     return True
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
@@ -29,15 +29,15 @@ class Foot:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyState:
     """A state, and what the model makes of it."""
 
     position: FloatArray  # (n,)
     velocity: FloatArray  # (n,)
     root: Vector  # m
     root_xyzw: Quaternion
-    tilt: Quaternion  # of the root against how it stands, facing along x
-    centre: Vector  # m, of mass
+    tilt: Quaternion  # how the root is turned against standing, facing along x
+    centre: Vector  # centre of mass, m
     centre_velocity: Vector  # m/s
     turns: list[Quaternion]  # orientation of each link
     spin: Vector  # rad/s, of the root
@@ -57,7 +57,7 @@ class BodyReader:
         self._model, self._legs = model, legs
         self._from_upright = conjugate(upright)
 
-    def read(self, position: FloatArray, velocity: FloatArray, contacts: FloatArray) -> Body:
+    def read(self, position: FloatArray, velocity: FloatArray, contacts: FloatArray) -> BodyState:
         """The body in a state, in which the model then is; `contacts` (links, 6) as observed."""
         self._model.update(position, velocity)
         origins, turns = self._model.link_poses()
@@ -72,7 +72,7 @@ class BodyReader:
         }
         quaternions: list[Quaternion] = [(x, y, z, w) for x, y, z, w in turns.tolist()]
         root_xyzw = quaternions[0]
-        return Body(
+        return BodyState(
             position=position,
             velocity=velocity,
             root=vector(position[:3]),

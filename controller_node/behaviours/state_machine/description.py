@@ -48,14 +48,14 @@ class PressureTarget:
 
     ahead: float = 0.0  # m
     outward: float = 0.0  # m
-    share: float = 0.5  # of the way from the stance foot to the other one, where both stand
+    share: float = 0.5  # share of the way from the stance foot to the other one, where both stand
     gain: float = 1.5  # m for each m that the extrapolated centre of mass is off its course, ahead
     side_gain: float = 1.5  # m for each m that it is off its course sideways
     speed_gain: float = 0.0  # m for each m/s that the body is too fast
 
 
 @dataclass(frozen=True)
-class Placement:
+class FootPlacement:
     """Where a foot goes, by a law of balance, and how."""
 
     law: str = "extrapolated"  # one of `laws.PLACEMENT_LAWS`
@@ -90,7 +90,7 @@ class Feedback:
 class Likeness:
     """A joint that goes with a leg, as an arm does with that of the other side."""
 
-    role: str  # of the leg
+    role: str  # the leg's role
     share: Vector  # rad, in joint axes, for each rad that the leg is ahead
 
 
@@ -158,17 +158,17 @@ class State:
 
     name: str
     feet: dict[str, str]  # by role: one of `FEET`
-    duration: float  # s, in which a foot that goes somewhere gets there
+    duration: float  # s in which a foot that goes somewhere gets there
     blend: float  # s, in which targets come over from the state before
     root: RootTarget
     pressure: PressureTarget
-    placement: Placement
+    placement: FootPlacement
     targets: tuple[JointTarget, ...]
     gains: dict[str, Gains]  # by joint as in `targets`
     efforts: dict[str, str | tuple[float, ...]]  # by joint as in `targets`: `BALANCE`, or N m
     bounds: Bounds
     ends: tuple[End, ...]
-    tracks: bool = False  # by the control law and its gains, not by inverse dynamics
+    tracks: bool = False  # whether the control law tracks the targets, not inverse dynamics
 
     @property
     def step_time(self) -> float:
@@ -192,7 +192,7 @@ class Machine:
     start: str
     states: dict[str, State]
     acceleration: float = 1e9  # m/s^2, at which it takes over commanded velocities
-    limits: VelocityRegion = _WITHOUT_LIMITS  # of the velocities that it takes
+    limits: VelocityRegion = _WITHOUT_LIMITS  # bounds of the velocities that it takes
 
     def joint(self, name: str, stance: str) -> str:
         """The character's joint of a name in a target, where a side is the stance side."""

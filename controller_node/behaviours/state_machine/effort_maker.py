@@ -6,17 +6,17 @@ from typing import NamedTuple
 import numpy as np
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Body, in_frame, in_world
+from controller_node.behaviours.state_machine.body import BodyState, in_frame, in_world
 from controller_node.behaviours.state_machine.description import (
     BALANCE,
     Machine,
     RootTarget,
     State,
 )
-from controller_node.behaviours.state_machine.leg import Leg
-from controller_node.behaviours.state_machine.pose import Pose
+from controller_node.behaviours.state_machine.legs.leg import Leg
+from controller_node.behaviours.state_machine.pose import TargetPose
 from controller_node.behaviours.state_machine.situation import Situation
-from controller_node.behaviours.state_machine.support import Contact, support_effort
+from controller_node.behaviours.state_machine.support import FootContact, support_effort
 from controller_node.control_laws import GainArrays
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -92,9 +92,9 @@ class EffortMaker:
         self,
         state: State,
         at: Situation,
-        pose: Pose,
+        pose: TargetPose,
         gains: GainArrays,
-        contacts: Sequence[Contact],
+        contacts: Sequence[FootContact],
         hold: Hold,
     ) -> FloatArray:
         """The effort (n,) by which the body moves as wanted, its feet pressed on the ground.
@@ -120,7 +120,9 @@ class EffortMaker:
             )
         return self.added(state, at, effort)
 
-    def _joint_accelerations(self, pose: Pose, body: Body, gains: GainArrays) -> FloatArray:
+    def _joint_accelerations(
+        self, pose: TargetPose, body: BodyState, gains: GainArrays
+    ) -> FloatArray:
         """Accelerations (n,) of implicit PD control with the diagonal of the mass matrix.
 
         `(Kp (e + h (vr - v)) + Kd (vr - v)) / (M + Kd h + Kp h^2)`: Tan, Liu and Turk 2011,
@@ -157,7 +159,7 @@ class EffortMaker:
         )
         return np.array((rise, *rotate(conjugate(body.root_xyzw), in_world(heading, angular))))
 
-    def _ankle_effort(self, contact: Contact, body: Body, heading: float) -> FloatArray:
+    def _ankle_effort(self, contact: FootContact, body: BodyState, heading: float) -> FloatArray:
         """What an ankle (3,) adds so that the sole is level and the knee above the foot, N m."""
         leg, foot = contact.leg, body.feet[contact.side]
         foot_xyzw = multiply(foot.turn, leg.upright[2])
@@ -191,7 +193,9 @@ class EffortMaker:
                 effort[entries] += np.array(value)
         return effort
 
-    def balanced(self, state: State, at: Situation, pose: Pose, gains: GainArrays) -> FloatArray:
+    def balanced(
+        self, state: State, at: Situation, pose: TargetPose, gains: GainArrays
+    ) -> FloatArray:
         """The effort (n,) beside that of the law: a stance hip's by SIMBICON's balance of torques.
 
         `tilt_gains` and `turn_gains` are then N m/rad and N m s/rad.
@@ -216,7 +220,7 @@ class EffortMaker:
         (p, d), (q, e) = root.tilt_gains, root.turn_gains
         return (p * error[0] - d * x, p * error[1] - d * y, q * error[2] - e * z)
 
-    def _pd_torque(self, leg: Leg, pose: Pose, body: Body, gains: GainArrays) -> Vector:
+    def _pd_torque(self, leg: Leg, pose: TargetPose, body: BodyState, gains: GainArrays) -> Vector:
         """The torque of PD control on a thigh, N m, world axes."""
         entries = leg.hip_entries
         error = self._model.error_of_state(pose.position)[entries]

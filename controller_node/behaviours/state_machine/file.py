@@ -20,11 +20,11 @@ from controller_node.behaviours.state_machine.description import (
     Condition,
     End,
     Feedback,
+    FootPlacement,
     Gains,
     JointTarget,
     Likeness,
     Machine,
-    Placement,
     PressureTarget,
     RootTarget,
     State,
@@ -205,8 +205,8 @@ def _values(reader: MappingReader, default: Any) -> Any:
     return type(default)(**changed)
 
 
-def _placement(reader: MappingReader) -> Placement:
-    placement: Placement = _values(reader, Placement())
+def _placement(reader: MappingReader) -> FootPlacement:
+    placement: FootPlacement = _values(reader, FootPlacement())
     if placement.law not in PLACEMENT_LAWS:
         raise reader.wrong("law", placement.law, " or ".join(f"'{law}'" for law in PLACEMENT_LAWS))
     if placement.origin not in (HIP, CENTRE):

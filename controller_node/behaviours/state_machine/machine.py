@@ -16,18 +16,18 @@ from controller_node.behaviours.state_machine.description import (
     State,
 )
 from controller_node.behaviours.state_machine.effort_maker import EffortMaker, Hold
-from controller_node.behaviours.state_machine.footing import (
+from controller_node.behaviours.state_machine.laws import smooth_step
+from controller_node.behaviours.state_machine.legs.footing import (
     ReachingFoot,
     SwingFoot,
     contacts_of,
     landing,
     origin_of,
 )
-from controller_node.behaviours.state_machine.laws import smooth_step
-from controller_node.behaviours.state_machine.leg import Leg
-from controller_node.behaviours.state_machine.pose import Pose, PoseMaker
+from controller_node.behaviours.state_machine.legs.leg import Leg
+from controller_node.behaviours.state_machine.pose import PoseMaker, TargetPose
 from controller_node.behaviours.state_machine.situation import Situation, quantity, situation_of
-from controller_node.behaviours.state_machine.support import Contact
+from controller_node.behaviours.state_machine.support import FootContact
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.steering.reference import Course
@@ -37,7 +37,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.geometry.scalars import Vector
 
-_STANDING = Course()
+_STANDING_COURSE = Course()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ class PoseTarget:
     def __init__(self, layout: JointLayout) -> None:
         self._layout = layout
         self._still = np.zeros(layout.size)
-        self.pose = Pose(self._still, self._still, self._still)  # kept up to date by its owner
+        # Its owner keeps the pose up to date.
+        self.pose = TargetPose(self._still, self._still, self._still)
 
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The targets, at whatever time."""
@@ -82,7 +83,7 @@ class StateMachine:
         self._state = kit.machine.states[kit.machine.start]
         self._since = 0.0  # s, time at which the state began
         self._entered = False
-        self._course = _STANDING
+        self._course = _STANDING_COURSE
         self._feet: dict[str, SwingFoot] = {}  # by role
         self._reaching: dict[str, ReachingFoot] = {}  # by role
         self._goal: tuple[float, float] | None = None  # m, where a foot that steps lands
@@ -93,7 +94,7 @@ class StateMachine:
     def advance(self, seen: Observation) -> BehaviourOutput:
         """The targets and efforts of a tick; the state before them may end first."""
         kit = self._kit
-        self._course = self._followed(seen.course or _STANDING)
+        self._course = self._followed(seen.course or _STANDING_COURSE)
         body = kit.reader.read(seen.position, seen.velocity, seen.contacts)
         at = situation_of(body, self._course, self._stance, self._swing, kit.gravity)
         if not self._entered:
@@ -170,7 +171,7 @@ class StateMachine:
         start = self._before[1]
         return start + share * (state.root.height - start)
 
-    def _pose(self, at: Situation, time: float, contacts: list[Contact]) -> Pose:
+    def _pose(self, at: Situation, time: float, contacts: list[FootContact]) -> TargetPose:
         """The targets of all joints."""
         kit, state = self._kit, self._state
         pose = kit.poses.free(state, at)
@@ -199,7 +200,7 @@ class StateMachine:
                 kit.poses.set_leg(pose, side, at.body, poses)
         return pose
 
-    def _pressure(self, at: Situation, contacts: list[Contact]) -> Vector:
+    def _pressure(self, at: Situation, contacts: list[FootContact]) -> Vector:
         """The centre of pressure, from the stance sole; without one that sole itself."""
         if len(contacts) != 1:
             return (0.0, 0.0, 0.0)

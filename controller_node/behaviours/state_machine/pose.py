@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Body, vector
+from controller_node.behaviours.state_machine.body import BodyState, vector
 from controller_node.behaviours.state_machine.description import STANCE, JointTarget, Machine, State
-from controller_node.behaviours.state_machine.leg import FootPose, Leg
+from controller_node.behaviours.state_machine.legs.leg import FootPose, Leg
 from controller_node.behaviours.state_machine.situation import Situation
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout, JointType
@@ -41,7 +41,7 @@ class _Joint:
     is_ball: bool
     parent: int
     upright: Quaternion  # the child link's orientation where the character stands
-    fixed: Quaternion  # of the child in its parent at angle 0
+    fixed: Quaternion  # turn of the child in its parent at angle 0
     mirror: float  # 1 or -1: sign of a hinge's angle on the other side
 
     def mirrored(self, value: Vector) -> Vector:
@@ -51,7 +51,7 @@ class _Joint:
 
 
 @dataclass
-class Pose:
+class TargetPose:
     """Targets of all entries, message form."""
 
     position: FloatArray  # (n,)
@@ -76,9 +76,11 @@ class PoseMaker:
         self._rest = np.array(character.rest_position)
         self._joints = _joints(character, upright)
 
-    def free(self, state: State, at: Situation) -> Pose:
+    def free(self, state: State, at: Situation) -> TargetPose:
         """The targets of a state's own joints; all others have those of the rest pose."""
-        pose = Pose(self._rest.copy(), np.zeros(self._layout.size), np.zeros(self._layout.size))
+        pose = TargetPose(
+            self._rest.copy(), np.zeros(self._layout.size), np.zeros(self._layout.size)
+        )
         pose.position[:6] = at.body.position[:6]
         for target in state.targets:
             joint = self._joints[self._machine.joint(target.joint, at.stance)]
@@ -115,7 +117,9 @@ class PoseMaker:
         parent = at.body.turns[joint.parent]
         return log(multiply(conjugate(multiply(parent, joint.fixed)), child))
 
-    def set_leg(self, pose: Pose, side: str, body: Body, feet: Sequence[FootPose]) -> None:
+    def set_leg(
+        self, pose: TargetPose, side: str, body: BodyState, feet: Sequence[FootPose]
+    ) -> None:
         """Have a leg lead its foot through three poses, a period apart, while the root moves on."""
         leg, period = self._legs[side], self._period
         vx, vy, vz, wx, wy, wz = body.velocity[:6].tolist()
@@ -140,7 +144,7 @@ class PoseMaker:
         pose.velocity[leg.knee_entry] = rate * bend
         pose.acceleration[leg.knee_entry] = rate * rate * (later - bend)
 
-    def follow_leg(self, pose: Pose, side: str, body: Body) -> None:
+    def follow_leg(self, pose: TargetPose, side: str, body: BodyState) -> None:
         """Have a leg's targets be where it is: nothing is asked of its joints."""
         leg = self._legs[side]
         for entries in (leg.hip_entries, leg.ankle_entries):

@@ -4,15 +4,15 @@ import math
 from dataclasses import dataclass
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.body import Body, Foot, in_frame, in_world
+from controller_node.behaviours.state_machine.body import BodyState, Foot, in_frame, in_world
 from controller_node.behaviours.state_machine.description import STEP, State
-from controller_node.behaviours.state_machine.leg import Leg
-from controller_node.behaviours.state_machine.stepping import sway_of_course
+from controller_node.behaviours.state_machine.legs.leg import Leg
+from controller_node.behaviours.state_machine.legs.stepping import sway_of_course
 from controller_node.references.steering.reference import Course
 from msgs_config.geometry.scalars import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum
-_STEADY = 0.6  # share of a sole, from its middle, that bears a body that stands
+_SUPPORTING_SHARE = 0.6  # share of a sole, from its middle, that bears a body that stands
 _MAX_PREDICTED = 4.0  # units of the pendulum's time for which it is predicted at most
 
 
@@ -20,7 +20,7 @@ _MAX_PREDICTED = 4.0  # units of the pendulum's time for which it is predicted a
 class Situation:
     """Lengths are along the heading (x), to its left (y) and up, from the stance sole, in m."""
 
-    body: Body
+    body: BodyState
     course: Course
     stance: str  # side of the stance foot
     swing: str
@@ -73,7 +73,9 @@ class Situation:
         return add(self.foot(self.stance).sole, in_world(self.course.heading, point))
 
 
-def situation_of(body: Body, course: Course, stance: str, swing: str, gravity: float) -> Situation:
+def situation_of(
+    body: BodyState, course: Course, stance: str, swing: str, gravity: float
+) -> Situation:
     """The situation of a body on a course, one of whose sides is the stance side."""
     sole, heading = body.feet[stance].sole, course.heading
     centre = in_frame(heading, subtract(body.centre, sole))
@@ -135,8 +137,8 @@ def _imbalance(at: Situation, leg: Leg) -> float:
     x, y = at.extrapolated
     beyond = []
     for value, other, half in (
-        (x, at.other[0], _STEADY * leg.half_length),
-        (y, at.other[1], _STEADY * leg.half_width),
+        (x, at.other[0], _SUPPORTING_SHARE * leg.half_length),
+        (y, at.other[1], _SUPPORTING_SHARE * leg.half_width),
     ):
         beyond.append(max(min(0.0, other) - half - value, value - max(0.0, other) - half, 0.0))
     ahead, aside = beyond

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.behaviours.state_machine.leg import Leg
+from controller_node.behaviours.state_machine.legs.leg import Leg
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.geometry import fixed_order
@@ -35,12 +35,12 @@ _STRAIGHT = 1e-3  # damps the joints of a leg that is nearly straight, m^2
 
 
 @dataclass(frozen=True)
-class Contact:
+class FootContact:
     """A foot that carries a share of the load, at a centre of pressure."""
 
     side: str
     leg: Leg
-    share: float  # of the load; those of all feet add up to 1
+    share: float  # share of the load; those of all feet add up to 1
     pressure: Vector  # m, world
 
 
@@ -50,9 +50,9 @@ class Bounds:
 
     friction: float = 0.4  # horizontal force over vertical force
     spin: float = 0.02  # m: moment about z over vertical force
-    least: float = 0.2  # weights: vertical force
+    least: float = 0.2  # least vertical force, in weights
     most: float = 2.0
-    sole: float = 0.6  # of half a sole's length and width: how far out the centre of pressure is
+    sole: float = 0.6  # share of half a sole, within which the centre of pressure is
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ def bounded(force: Vector, spin: float, bounds: Bounds, weight: float) -> tuple[
 def support_effort(
     model: DynamicsModel,
     acceleration: FloatArray,  # (n,) that is wanted; horizontally the root's does not count
-    contacts: Sequence[Contact],  # their shares add up to 1
+    contacts: Sequence[FootContact],  # their shares add up to 1
     bounds: Bounds,
     root: tuple[Vector, Quaternion],  # its place in m, and its orientation
 ) -> FloatArray:
@@ -137,7 +137,7 @@ def support_effort(
 def _wrench_wanted(
     inertia: FloatArray,  # (6, 6): the root's wrench by its acceleration
     needed: FloatArray,  # (6,): its wrench where it does not accelerate horizontally
-    contacts: Sequence[Contact],
+    contacts: Sequence[FootContact],
     root: tuple[Vector, Quaternion],
 ) -> tuple[Vector, float]:
     """Force (N) at the centre of pressure, and moment about z there (N m).

@@ -21,7 +21,7 @@ from msgs_config.arrays import FloatArray
 
 _knot_before = compiled(knot_before)
 
-_FASTEST = 1e3  # rad/s or m/s; what is faster has diverged
+_MAX_SPEED = 1e3  # rad/s or m/s; what is faster has diverged
 
 
 class EngineBuffers(NamedTuple):
@@ -54,9 +54,9 @@ class Desired(NamedTuple):
     """The reference over the horizon, and how the offsets are laid over it."""
 
     first_tick: int  # the horizon's first tick, since the episode began
-    knot_ticks: int  # from one knot to the next
+    knot_ticks: int  # ticks from one knot to the next
     first_knot: int  # number of the first knot that is given
-    check_ticks: int  # from one check to the next
+    check_ticks: int  # ticks from one check to the next
     positions: FloatArray  # (ticks + 1, q) as MuJoCo has them
     velocities: FloatArray  # (ticks + 1, n)
 
@@ -154,7 +154,7 @@ def _is_bounded(engine: EngineBuffers) -> bool:
     """Whether the state is one that goes on, and the forces are finite."""
     bounded = True
     for i in range(len(engine.velocity)):
-        bounded &= abs(engine.velocity[i]) < _FASTEST and abs(engine.applied[i]) < math.inf
+        bounded &= abs(engine.velocity[i]) < _MAX_SPEED and abs(engine.applied[i]) < math.inf
     return bounded
 
 

@@ -25,17 +25,17 @@ class ResidualModel:
     def __init__(
         self, character: Character, model: ContactModel, settings: PlannerSettings
     ) -> None:
-        joints, weights = len(settings.sigma), settings.weights
+        joints, weights = len(settings.sigma), settings.parameters.weights
         is_foot = [character.links[index].name in character.feet for index in model.end_effectors]
         parts = [
-            (weights["root_rotation"], 3),
-            (weights["joints"], joints),
-            (weights["root_spin"], 3),
-            (weights["joint_rates"], joints),
-            (weights["centre_of_mass"], 3),
-            (weights["centre_of_mass_velocity"], 3),
-            (weights["angular_momentum"], 3),
-            *((weights["feet" if foot else "hands"], 3) for foot in is_foot),
+            (weights.root_rotation, 3),
+            (weights.joints, joints),
+            (weights.root_spin, 3),
+            (weights.joint_rates, joints),
+            (weights.centre_of_mass, 3),
+            (weights.centre_of_mass_velocity, 3),
+            (weights.angular_momentum, 3),
+            *((weights.feet if foot else weights.hands, 3) for foot in is_foot),
         ]
         share = 1.0 / math.sqrt(settings.checks)  # the mean of the checks' squares counts
         self._weights = share * np.repeat(

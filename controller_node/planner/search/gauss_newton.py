@@ -20,8 +20,8 @@ from controller_node.planner.compiled import linear
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
-_RIDGE = 20.0  # of a correction of known sensitivities, in the samples' variance
-_FIRST_RIDGE = 1e-6  # of the first sensitivities, for each entry of x
+_RIDGE = 20.0  # ridge, in the samples' variance, of a correction of known sensitivities
+_FIRST_RIDGE = 1e-6  # ridge of the first sensitivities, for each entry of x
 
 
 def ensemble_steps(

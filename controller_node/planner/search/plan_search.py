@@ -37,7 +37,7 @@ class Start:
     desired: Foreseen
     body: RolloutModel
     anchor: Anchor
-    perturbed: bool  # whether the character is: then its feet go where they catch it
+    perturbed: bool  # whether the character is pushed off: then its feet go where they catch it
 
 
 class PlanSearch:
@@ -48,11 +48,10 @@ class PlanSearch:
         rollouts: RolloutPool,
         residual_model: ResidualModel,
         settings: PlannerSettings,
-        rate_hz: int,
     ) -> None:
         self._rollouts, self._residual_model = rollouts, residual_model
-        self._settings, self._rate_hz = settings, rate_hz
-        self._unit = settings.noise * settings.sigma  # (n - 6,) rad or m: the unit of x
+        self._settings = settings
+        self._unit = settings.parameters.noise * settings.sigma  # (n - 6,) rad or m: the unit of x
 
     def find(self, start: Start, old: Plan | None, seed: tuple[int, int]) -> Plan:
         """A plan from a state, sought around what is left of an old one.
@@ -67,7 +66,7 @@ class PlanSearch:
         rounds, enough = _FIRST_ROUNDS, 0.0
         if old is not None:
             sensitivities = old.faded(tick, areas, settings)
-            rounds, enough = settings.rounds, settings.tolerance
+            rounds, enough = settings.parameters.rounds, settings.parameters.tolerance
         for number in range(rounds):
             found = improve(problem, place, self._samples(seed, number, tick), sensitivities)
             place, sensitivities = found.place, found.sensitivities
@@ -102,7 +101,7 @@ class PlanSearch:
 
     def _samples(self, seed: tuple[int, int], number: int, tick: int) -> FloatArray:
         """The draws (s, d) of a round, by its number."""
-        count = self._settings.samples * (_MORE if number else 1)
+        count = self._settings.parameters.samples * (_MORE if number else 1)
         size = self._knot_count(tick) * len(self._unit)
         draws = normal_draws(seed, (number, tick), count * size).reshape(count, size)
         return _WIDE_FACTOR * draws if number % 2 else draws
@@ -116,7 +115,11 @@ class PlanSearch:
 
     def _problem(self, start: Start) -> LeastSquaresProblem:
         """What a plan from a state is to make small."""
-        settings, checks, desired = self._settings, self._settings.checks, start.desired
+        noise, checks, desired = (
+            self._settings.parameters.noise,
+            self._settings.checks,
+            start.desired,
+        )
 
         def deviations(places: FloatArray) -> FloatArray:
             plans = places.reshape(len(places), -1, len(self._unit)) * self._unit
@@ -132,10 +135,10 @@ class PlanSearch:
             weighted = self._residual_model.residuals(by_check, perturbed=start.perturbed)
             return weighted.reshape(rows.shape)
 
-        penalty = _PENALTY * settings.noise
+        penalty = _PENALTY * noise
         knots = self._knot_count(desired.rollout.first_tick)
         return LeastSquaresProblem(
-            deviations, residuals, penalty * penalty / knots, _MAX_OFFSET / settings.noise
+            deviations, residuals, penalty * penalty / knots, _MAX_OFFSET / noise
         )
 
     def _knot_count(self, tick: int) -> int:
@@ -150,6 +153,7 @@ class PlanSearch:
         best = found.deviations[0].reshape(checks, -1)
         centres, _ = self._residual_model.balance(start.desired.features + best)
         numbers: FloatArray = np.arange(1.0, checks + 1.0)
-        times = (settings.delay + settings.period * numbers) / self._rate_hz
+        given = settings.parameters
+        times = (given.delay + settings.period * numbers) / given.rate_hz
         costs, others = fixed_order.dot(residuals, residuals)
         return Outlook(times, start.anchor.to_world(centres), costs, others, start.anchor)

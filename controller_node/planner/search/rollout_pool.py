@@ -28,7 +28,7 @@ class RolloutPool:
     def __init__(self, model: ContactModel, workers: int) -> None:
         """The thread that asks is one of the workers."""
         self._model = model
-        self._own = model.engine()  # for single states, of the thread that asks for them
+        self._own = model.engine()  # the engine of single states, in the thread that asks for them
         self._engines = [model.engine() for _ in range(workers)]
         self._threads = ThreadPoolExecutor(max(workers - 1, 1))
 

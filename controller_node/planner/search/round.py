@@ -11,8 +11,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 _DAMPINGS = (3.0, 0.3)  # lambda of the steps
-_KEPT = 0.9  # share of the samples; the worst say little of where costs are low
-_FEWEST = 4  # samples that a step can be found from
+_SHARE_OF_SAMPLES = 0.9  # share of the samples; the worst say little of where costs are low
+_MIN_SAMPLES = 4  # samples that a step can be found from
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def improve(
     deviations = problem.deviations(places)
     costs = _costs(problem, places, deviations)
     elites = _best(costs[1:]) + 1
-    if not np.isfinite(costs[0]) or len(elites) < _FEWEST:
+    if not np.isfinite(costs[0]) or len(elites) < _MIN_SAMPLES:
         return _found(places, costs, deviations, known)
     distances, changes = places[elites] - places[0], deviations[elites] - deviations[0]
     residuals = problem.residuals(deviations[0])
@@ -101,7 +101,7 @@ def _costs(problem: LeastSquaresProblem, places: FloatArray, deviations: FloatAr
 
 def _best(costs: FloatArray) -> FloatArray:
     """The samples but the worst, in their order; of equal ones the first."""
-    best = np.argsort(costs, kind="stable")[: round(_KEPT * len(costs))]
+    best = np.argsort(costs, kind="stable")[: round(_SHARE_OF_SAMPLES * len(costs))]
     return np.sort(best[np.isfinite(costs[best])])
 
 

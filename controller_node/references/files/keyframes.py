@@ -31,7 +31,7 @@ class Keyframes:
 
     times: FloatArray  # (p,) s, rising
     configurations: GeneralizedPosition  # (p, n), (p, k, 4)
-    smooth: bool  # else the path is linear
+    smooth: bool  # whether the path is a spline, not linear
     period: float | None = None  # s, of a loop
 
 

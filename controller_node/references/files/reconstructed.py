@@ -24,7 +24,7 @@ PLAN, RECONSTRUCTION = "Plan", "Reconstruction"
 SUFFIX = ".json"
 
 _LARGEST_OFFSET = 1e3  # rad or m; more is a mistake
-_MALFORMED = (ValueError, KeyError, TypeError, OverflowError)
+_ERRORS_OF_MALFORMED = (ValueError, KeyError, TypeError, OverflowError)
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class FoundWith:
     duration: float  # s, as far as it was found
     simulator: Mapping[str, object]  # parameters of `sim_node`, by name
     controller: Mapping[str, object]  # parameters of `controller_node`, by name
-    pushes: tuple[str, ...]  # LINK:FX,FY,FZ@S, which came in the search, too
+    pushes: tuple[str, ...]  # each as LINK:FX,FY,FZ@S; they came in the search, too
 
 
 class ReconstructedClip(ClipFile):
@@ -67,7 +67,7 @@ class ReconstructedClip(ClipFile):
                 dict(sides["controller_node"]),
                 tuple(pushes),
             )
-        except _MALFORMED as error:
+        except _ERRORS_OF_MALFORMED as error:
             raise ClipError(
                 f"{self.path}: {RECONSTRUCTION} must have 'duration', 'parameters' of sim_node "
                 "and of controller_node, and 'pushes' as texts, if any"
@@ -84,7 +84,7 @@ def _plan(path: Path, layout: JointLayout, content: Any) -> RecordedPlan:
             Offsets(knot_ticks, int(part["knot"]), np.array(part["offsets"], dtype=float))
             for part in content["parts"]
         ]
-    except _MALFORMED as error:
+    except _ERRORS_OF_MALFORMED as error:
         raise ClipError(
             f"{place} must have 'rate', 'ticks' and 'knot_ticks', 'dofs', and 'parts' with 'tick', "
             "'knot' and 'offsets'"

@@ -22,9 +22,9 @@ from msgs_config.errors import MotionError
 from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
-_MOST_WAITING = 1000  # commands
-_LEANS_IN = 0.15  # s, time constant of the lean
-_LEANS_AHEAD = 0.5  # share of the full lean ahead: feet in front and behind are off the ground
+_MAX_WAITING = 1000  # commands
+_LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
+_LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead: feet in front and behind are off the ground
 _GRAVITY = 9.81  # m/s^2
 
 
@@ -38,7 +38,7 @@ class Course:
     forward: float = 0.0  # m/s
     left: float = 0.0  # m/s
     turn: float = 0.0  # rad/s
-    phase: float = 0.0  # of the gait's cycle, from 0 to 1
+    phase: float = 0.0  # phase of the gait's cycle, from 0 to 1
     acceleration_ahead: float = 0.0  # m/s^2, smoothed; in the character's own frame
     acceleration_left: float = 0.0
 
@@ -83,6 +83,10 @@ class SteeredReference:
         self._poses: dict[int, GeneralizedPosition] = {}
         self._no_acceleration = np.zeros(character.layout.size)
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the poses, which follow from the course."""
+        return vars(self) | {"_poses": {}}
+
     @property
     def repeat_ticks(self) -> int:
         """After how many ticks a command is to be given again, so that it does not time out."""
@@ -111,8 +115,8 @@ class SteeredReference:
         command = self.limits.clamped(command)
         in_force = max(self._row(now), 0)
         before = [each for each in self._commands[in_force:] if each.tick < command.tick]
-        if len(before) > _MOST_WAITING:
-            raise MotionError(f"cmd_vel: more than {_MOST_WAITING} are yet to begin")
+        if len(before) > _MAX_WAITING:
+            raise MotionError(f"cmd_vel: more than {_MAX_WAITING} are yet to begin")
         reference = SteeredReference(
             self._character,
             self._gait,
@@ -159,7 +163,7 @@ class SteeredReference:
         cosine, sine = math.cos(heading), math.sin(heading)
         ahead = (forward - course.forward) / period - turn * left
         leftward = (left - course.left) / period + turn * forward
-        share = min(period / _LEANS_IN, 1.0)
+        share = min(period / _LEAN_TIME_CONSTANT, 1.0)
         return Course(
             course.x + period * (cosine * forward - sine * left),
             course.y + period * (sine * forward + cosine * left),
@@ -205,7 +209,7 @@ class SteeredReference:
 
 def _lean(course: Course) -> tuple[FloatArray, float]:
     """The turn xyzw (4,) of the root as it leans, and the cosine of its angle."""
-    ahead = _LEANS_AHEAD * course.acceleration_ahead / _GRAVITY
+    ahead = _LEAN_SHARE_AHEAD * course.acceleration_ahead / _GRAVITY
     left = course.acceleration_left / _GRAVITY
     upright = 1.0 / math.sqrt(1.0 + ahead * ahead + left * left)
     size = math.sqrt(2.0 * (1.0 + upright))

@@ -3,7 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
-_BACKWARD, _SIDEWAYS = 0.6, 0.3  # m/s, at most
+from msgs_config.settings import Settings, parameter
+
+_BACKWARD, _SIDEWAYS = 0.6, 0.3  # largest speeds, m/s
 
 
 @dataclass(frozen=True)
@@ -30,16 +32,25 @@ class VelocityRegion:
     turn: float = math.inf  # rad/s, to either side
 
 
-@dataclass(frozen=True)
-class SteeringLimits:
+class SteeringLimits(Settings, prefix="steering."):
     """How fast it may go, how fast that changes, and how long a command holds."""
 
-    speed: float  # m/s
-    acceleration: float  # m/s^2
-    braking: float  # m/s^2, while it slows down
-    turn_rate: float  # rad/s
-    turn_acceleration: float  # rad/s^2
-    timeout: float  # s
+    speed: float = parameter(2.5, "its largest speed ahead", unit="m/s", maximum=10.0)
+    acceleration: float = parameter(1.3, "of its speed", unit="m/s^2", minimum=0.01, maximum=100.0)
+    braking: float = parameter(
+        2.2, "likewise, while it slows down", unit="m/s^2", minimum=0.01, maximum=100.0
+    )
+    turn_rate: float = parameter(1.0, "its largest turn rate", unit="rad/s", maximum=10.0)
+    turn_acceleration: float = parameter(
+        1.5, "of its turn rate", unit="rad/s^2", minimum=0.01, maximum=100.0
+    )
+    timeout: float = parameter(
+        1.0,
+        "simulated time after a command at which it stops, unless another one comes",
+        unit="s",
+        minimum=0.1,
+        maximum=1e6,
+    )
     region: VelocityRegion = VelocityRegion(back=_BACKWARD, aside=_SIDEWAYS)
 
     def clamped(self, command: VelocityCommand) -> VelocityCommand:

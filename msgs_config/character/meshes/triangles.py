@@ -9,7 +9,6 @@ import io
 import re
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from msgs_config.extras import require_extra
 from msgs_config.geometry import fixed_order
 
 _MAX_TRIANGLES = 2_000_000
-_MAX_GEOMETRIES = 10_000  # of a COLLADA file, whose nodes may repeat each other
+_MAX_NODES = 20_000  # of a COLLADA file, whose nodes may repeat each other
 _STL_HEADER_BYTES = 80
 _STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _VERTEX_OF_TEXT = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
@@ -137,11 +136,12 @@ def _read_collada(path: Path, raw: bytes) -> FloatArray:
     nodes = content.scene.nodes if content.scene is not None else []
     parts: list[FloatArray] = [np.empty((0, 3, 3))]
     count = 0
-    geometries = islice(_walk(nodes, np.eye(4)), _MAX_GEOMETRIES + 1)
-    for number, (geometry, matrix) in enumerate(geometries):
-        for triangles in _triangles(geometry.primitives):
+    for number, (primitives, matrix) in enumerate(_walk(nodes, np.eye(4))):
+        if number == _MAX_NODES:
+            raise ValueError(f"it has more than {_MAX_NODES} nodes")
+        for triangles in _triangles(primitives):
             count += len(triangles)
-            if number == _MAX_GEOMETRIES or count > _MAX_TRIANGLES:
+            if count > _MAX_TRIANGLES:
                 raise ValueError(f"it has more than {_MAX_TRIANGLES} triangles")
             parts.append(fixed_order.apply(matrix[:3, :3], triangles) + matrix[:3, 3])
     unit = content.assetInfo.unitmeter
@@ -159,17 +159,18 @@ def _read_by_trimesh(path: Path, raw: bytes) -> FloatArray:
     return np.asarray(scene.to_mesh().triangles, dtype=float)
 
 
-def _walk(nodes: list[Any], above: FloatArray) -> Iterator[tuple[Any, FloatArray]]:
-    """The geometries of a scene, each with its pose (4, 4) in it."""
+def _walk(nodes: list[Any], above: FloatArray) -> Iterator[tuple[list[Any], FloatArray]]:
+    """The nodes of a scene: the primitives of each, and its pose (4, 4) in the scene."""
     from collada.scene import GeometryNode, Node, NodeNode
 
     for node in nodes:
         if isinstance(node, GeometryNode):
-            yield node.geometry, above
+            yield node.geometry.primitives, above
         elif isinstance(node, Node):
             matrix = above
             for transform in (node.node if isinstance(node, NodeNode) else node).transforms:
                 matrix = fixed_order.product(matrix, np.asarray(transform.matrix, dtype=float))
+            yield [], matrix
             yield from _walk(node.children, matrix)
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf.formats import check_root
+from msgs_config.character.urdf.file_formats.formats import check_root
+from msgs_config.character.urdf.file_formats.vocabulary import leave_out_unknown
 from msgs_config.character.urdf.frames import MAX_JOINTS, find_frames, joint_end
 from msgs_config.character.urdf.inertia import LEAST_MOMENT, ROUNDING
 from msgs_config.character.urdf.limits import WITH_BOUNDS, read_bounds
 from msgs_config.character.urdf.reading import FLOATING, WITH_AXIS, read_axis
-from msgs_config.character.urdf.vocabulary import leave_out_unknown
 from msgs_config.errors import CharacterError
 
 MAX_LINKS = 2000
@@ -27,7 +27,7 @@ _MAX_NUMBER = 1e30  # the engine's single precision ends at 3e38
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _ANY, _POSITIVE = -_MAX_NUMBER, 0.0
 MOMENTS = ("ixx", "iyy", "izz")
-NUMBERS = {  # by element and attribute: how many, and the least that they may be
+NUMBERS = {  # how many numbers, and how small at least, by element and attribute
     "origin": {"xyz": (3, _ANY), "rpy": (3, _ANY)},
     "axis": {"xyz": (3, _ANY)},
     "mass": {"value": (1, _POSITIVE)},

@@ -36,12 +36,12 @@ class DescribedJoint:
     type: JointType
     parent: str
     child: str
-    pose: Pose = _AT_PARENT  # of the child in the parent at position 0
-    axis: Vector = (0.0, 0.0, 0.0)  # in the child
+    pose: Pose = _AT_PARENT  # pose of the child in the parent at position 0
+    axis: Vector = (0.0, 0.0, 0.0)  # axis in the child's frame
     lower: float = -math.inf  # rad or m
     upper: float = math.inf
     effort_limit: float = math.inf  # N m or N
-    mimic: Mimic | None = None  # of a joint that follows another
+    mimic: Mimic | None = None  # says which joint this one follows
 
 
 class DescribedJoints:
@@ -56,7 +56,7 @@ class DescribedJoints:
         root = character.links[0].name
         self.has_own_base = base_frame not in self._links
         self.root = base_frame if self.has_own_base else root
-        self.turn_xyzw = rotations.ABOUT_X_QUARTER_TURN_XYZW  # of the base link in the root
+        self.turn_xyzw = rotations.ABOUT_X_QUARTER_TURN_XYZW  # turns the base link into the root
         if not (self.has_own_base and character.up_axis == "y"):
             self.turn_xyzw = np.array(rotations.IDENTITY_XYZW)
         joints: list[DescribedJoint] = []

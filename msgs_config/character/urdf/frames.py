@@ -11,7 +11,7 @@ from msgs_config.character.urdf.reading import FLOATING
 MAX_JOINTS = 127
 """That the engine can hold, without those of mere frames, which are merged before it reads them."""
 
-_POSED = ("inertial", "visual", "collision")
+_POSED_ELEMENTS = ("inertial", "visual", "collision")
 
 
 def joint_end(joint: ElementTree.Element, which: str) -> str:
@@ -143,7 +143,7 @@ class LinkTree:
             child.remove(inertial)
         del self._links[name]
         for part in child:
-            if part.tag in _POSED:
+            if part.tag in _POSED_ELEMENTS:
                 move_origin(part, pose)
                 self._links[parent].append(part)
         for other in self._joints:

@@ -23,13 +23,14 @@ LEAST_MOMENT = 1e-15
 LEAST_MASS = 1e-15
 """Masses, kg, that count as none: the engines divide by no smaller ones."""
 
-_DIAGONAL, _BESIDE = ("ixx", "iyy", "izz"), (("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
-ENTRIES = (*_DIAGONAL, *(name for name, _, _ in _BESIDE))
+_DIAGONAL_ENTRIES = ("ixx", "iyy", "izz")
+_OFF_DIAGONAL_ENTRIES = (("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
+ENTRIES = (*_DIAGONAL_ENTRIES, *(name for name, _, _ in _OFF_DIAGONAL_ENTRIES))
 """The attributes of `<inertia>`."""
 _DIGITS = 1e-20  # share of the largest entry: too little to alter a digit of another
 _NO_POSE = Pose()
 _WATER = 1000.0  # kg/m^3
-_SWEEPS = 20  # of Jacobi's method, which doubles its digits with each
+_SWEEPS = 20  # each sweep of Jacobi's method doubles its digits
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ def read_inertial(link: ElementTree.Element) -> Inertial:
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     tensor = np.zeros((3, 3))
     if inertia is not None:
-        np.fill_diagonal(tensor, [float(inertia.get(name, "0")) for name in _DIAGONAL])
-        for name, row, column in _BESIDE:
+        np.fill_diagonal(tensor, [float(inertia.get(name, "0")) for name in _DIAGONAL_ENTRIES])
+        for name, row, column in _OFF_DIAGONAL_ENTRIES:
             tensor[row, column] = tensor[column, row] = float(inertia.get(name, "0"))
     rows = [(x, y, z) for x, y, z in tensor.tolist()]
     value = 0.0 if mass is None else float(mass.get("value", "0"))
@@ -73,9 +74,9 @@ def read_inertial(link: ElementTree.Element) -> Inertial:
 
 def write_moments(inertia: ElementTree.Element, moments: Vector) -> None:
     """Give an `<inertia>` these principal moments, kg m^2, and no products."""
-    for name, moment in zip(_DIAGONAL, moments, strict=True):
+    for name, moment in zip(_DIAGONAL_ENTRIES, moments, strict=True):
         inertia.set(name, repr(moment))
-    for name, _, _ in _BESIDE:
+    for name, _, _ in _OFF_DIAGONAL_ENTRIES:
         inertia.set(name, "0")
 
 
@@ -101,7 +102,7 @@ def principal_axes(tensor: FloatArray) -> tuple[FloatArray, FloatArray]:
     a, axes = tensor.copy(), np.eye(3)
     nothing = _DIGITS * float(np.abs(tensor).max())
     for _ in range(_SWEEPS):
-        for _, p, q in _BESIDE:
+        for _, p, q in _OFF_DIAGONAL_ENTRIES:
             if abs(a[p, q]) <= nothing:
                 continue
             theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from msgs_config import files
-from msgs_config.character.urdf.vocabulary import LeftOut, leave_out_unknown, listed
+from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, leave_out_unknown, listed
 from msgs_config.errors import CharacterError
 from msgs_config.geometry.scalars import norm
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Frame, UrdfOptions
+from msgs_config.character.urdf.file_formats.vocabulary import listed
 from msgs_config.character.urdf.frames import LinkTree, joint_end
 from msgs_config.character.urdf.inertia import (
     ENTRIES,
@@ -24,10 +25,9 @@ from msgs_config.character.urdf.inertia import (
 from msgs_config.character.urdf.joints import fix_locked_joints
 from msgs_config.character.urdf.mimic import lock_followers_of_fixed, read_mimics
 from msgs_config.character.urdf.origin import write_origin
-from msgs_config.character.urdf.vocabulary import listed
 from msgs_config.geometry import fixed_order, rotations
 
-_CHANGED = 1e-6  # share of the largest moment of inertia: more than a file's last digits
+_CHANGE_TOLERANCE = 1e-6  # share of the largest moment of inertia: more than a file's last digits
 
 
 class Repairs(NamedTuple):
@@ -194,7 +194,7 @@ def _repair_inertia(link: ElementTree.Element) -> list[str]:
     if not is_diagonal:
         _turn(link, inertial, axes)
     change = float(np.abs(moments - physical).max())
-    if change <= max(LEAST_MOMENT, _CHANGED * float(np.abs(moments).max())):
+    if change <= max(LEAST_MOMENT, _CHANGE_TOLERANCE * float(np.abs(moments).max())):
         return []
     before, after = (", ".join(f"{moment:.4g}" for moment in m) for m in (moments, physical))
     return [f"{link.get('name')} ({before}) -> ({after})"]

@@ -6,7 +6,8 @@ import pytest
 from backports import zstd
 from mcap.writer import CompressionType, IndexType
 
-from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.format.storage import FileStatistics
+from actuated_characters.bags.reader import open_bag, read_messages
 from actuated_characters.report.contents import read_contents
 from msgs_config.errors import RecordingError
 from tests.support.foreign_bags import (
@@ -20,6 +21,13 @@ from tests.support.foreign_bags import (
 )
 
 UNORDERED = SENT[10:] + SENT[:10]
+COUNTED = ({"/a": 20, "/b": 10}, 0, 29)
+
+
+def counted(bag: Path) -> FileStatistics:
+    """Messages by topic, and the first and the last log time."""
+    with open_bag(bag) as file:
+        return file.statistics()
 
 
 @pytest.fixture
@@ -98,6 +106,7 @@ def test_the_files_of_a_split_bag_are_read_as_one_by_log_time(bag: Path, suffix:
     write_metadata(bag, 9, storage, names, ["/a", "/b"])
 
     assert texts(bag) == SENT
+    assert counted(bag) == COUNTED
 
 
 @pytest.mark.parametrize("mode", ["FILE", "file"])
@@ -166,10 +175,14 @@ def test_a_single_mcap_file_is_read_by_log_time(
 
     assert texts(file) == SENT
     assert [each.topic for each in read_messages(file, ["/b"])] == ["/b"] * 10
+    assert counted(file) == COUNTED
 
 
 def test_a_single_sqlite_file_is_read(tmp_path: Path) -> None:
-    assert texts(write_humble_db3(tmp_path / "one.db3", UNORDERED)) == SENT
+    file = write_humble_db3(tmp_path / "one.db3", UNORDERED)
+
+    assert texts(file) == SENT
+    assert counted(file) == COUNTED
 
 
 def test_a_topic_without_messages_is_known_from_the_metadata(bag: Path) -> None:

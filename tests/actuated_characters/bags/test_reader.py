@@ -51,7 +51,9 @@ def test_what_is_no_complete_recording_is_an_error_that_names_the_path(
     with (recording / "walk.1.mcap").open("r+b") as file:
         file.truncate(1000)
     cut_off = r"^cannot read recording .*walk\.1: walk.1.mcap: it is cut off, or was never closed; "
-    with pytest.raises(RecordingError, match=f"{cut_off}'actuated_characters recover .*walk.1'"):
+    with pytest.raises(
+        RecordingError, match=f"{cut_off}'actuated_characters info .*walk.1 --recover'"
+    ):
         list(read_messages(recording))
     (recording / "metadata.yaml").write_bytes(b"\xff")
     with pytest.raises(RecordingError, match=r"cannot read recording .*walk\.1: metadata.yaml is"):

@@ -1,4 +1,4 @@
-"""Files that were cut off, damaged, split or compressed: the parts that `recover` finds."""
+"""Files that were cut off, damaged, split or compressed: the parts that a recovery finds."""
 
 import os
 from collections.abc import Iterator

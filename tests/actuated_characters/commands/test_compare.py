@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from actuated_characters.bags.recording import read_recording, read_recordings
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from actuated_characters.report.comparison.comparison import RecordingComparison, compare, pair
+from actuated_characters.report.comparison import RecordingComparison, compare, pair
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages.state import StampedState

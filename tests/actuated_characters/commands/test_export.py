@@ -1,17 +1,39 @@
-"""A recording as CSV is read back by Python's own reader, to the last bit."""
+"""`export` of runs, bags and clips: the motion in its files, and what is refused in one line."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from actuated_characters.bags.recording import read_recording
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
-from tests.support.bags import Made, add_to, make_run, write_bag
+from actuated_characters.export.sources import of_recordings, read_source
+from character_motion.bvh.kinematics import forward_kinematics
+from character_motion.bvh.reading import read_bvh
+from msgs_config.character.dynamics import still_model
+from msgs_config.clips.reading import clip_path
+from msgs_config.messages import topics
+from tests.support.bags import Made, add_to, make_run, raw_configuration, raw_states, write_bag
 from tests.support.eventful import Eventful, eventful_run, write_timed
+from tests.support.gltf import Gltf, assert_valid
+from tests.support.limits import file_size_limit
+from tests.support.physics import character
 
-RESET_AFTER = 6
+TO_FILE = [1, 2, 0]  # of x, y, z: y is up, forward is z
+RESET_AFTER = 30
+CLOSE = 2e-5  # m
+
+
+@pytest.fixture(scope="module")
+def dropped() -> Eventful:
+    """A humanoid that holds itself, with a reset."""
+    return eventful_run("humanoid", 60, reset_after=RESET_AFTER)
+
+
+@pytest.fixture(scope="module")
+def bag(dropped: Eventful, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_timed(tmp_path_factory.mktemp("run") / "bag", dropped.messages())
 
 
 @pytest.fixture(scope="module")
@@ -19,97 +41,189 @@ def pendulum() -> Made:
     return make_run("pendulum", 0.05)
 
 
-@pytest.fixture(scope="module")
-def dropped() -> Eventful:
-    return eventful_run("humanoid", 12, reset_after=RESET_AFTER)
-
-
 def exported(*arguments: str | Path) -> int:
     return main(["export", *map(str, arguments)])
 
 
-def table(file: Path) -> list[dict[str, str]]:
-    with file.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
+    """The one line of an export that ends with an error."""
+    assert exported(*arguments) == 1
+    line = capsys.readouterr().err
+    assert line.startswith("error: ") and line.count("\n") == 1
+    return line
 
 
-def numbers(rows: list[dict[str, str]], kind: str, names: tuple[str, ...]) -> np.ndarray:
-    """The cells of a kind (rows, n); NaN where they are empty."""
-    cells = [[row[f"{kind}.{name}"] for name in names] for row in rows]
-    return np.array([[float(cell) if cell else np.nan for cell in row] for row in cells])
+@pytest.mark.parametrize("suffix", [".glb", ".gltf", ".bvh"])
+def test_a_run_is_there_state_by_state(
+    bag: Path, dropped: Eventful, tmp_path: Path, suffix: str
+) -> None:
+    file, rate = tmp_path / f"motion{suffix}", 240.0
+
+    assert exported(bag.parent, "--output", file, "--fps", rate) == 0
+
+    whole = dropped.plan.character
+    expected = [still_model(whole, s.position).link_poses()[0][:, TO_FILE] for s in dropped.states]
+    ankle = [link.name for link in whole.links].index("left_ankle")
+    if suffix == ".bvh":
+        motion = read_bvh(file)
+        joint = motion.skeleton.names.index("left_ankle")
+        found = forward_kinematics(motion).positions[:, joint]
+    else:
+        read = Gltf.of_glb if suffix == ".glb" else Gltf.of_text
+        gltf = read(file.read_bytes())
+        assert_valid(gltf)
+        node = gltf.node("left_ankle")
+        found = np.array([gltf.poses(k / rate)[node][:3, 3] for k in range(len(expected))])
+    np.testing.assert_allclose(found, np.array(expected)[:, ankle], atol=CLOSE)
 
 
-def test_every_number_is_the_messages_own(dropped: Eventful, tmp_path: Path) -> None:
-    bag, file = write_timed(tmp_path / "bag", dropped.messages()), tmp_path / "states.csv"
+def test_the_usual_rate_is_the_runs_own_divided_and_a_part_can_be_taken(
+    bag: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "part.bvh"
 
-    assert exported(bag, "--output", file) == 0
+    assert exported(bag, "--output", file, "--from", "0.05", "--to", "0.1", "--units", "cm") == 0
 
-    rows, names = table(file), dropped.plan.character.layout.dof_names
-    assert len(rows) == len(dropped.states) == 13
-    assert [int(row["stamp_ns"]) for row in rows] == [s.stamp_ns for s in dropped.states]
-    for kind in ("position", "velocity"):
-        expected = np.array([getattr(state, kind) for state in dropped.states])
-        assert numbers(rows, kind, names).tobytes() == expected.tobytes()
-    missing = np.full(len(names), np.nan)
-    expected = np.array([missing if s.effort is None else s.effort for s in dropped.states])
-    np.testing.assert_array_equal(numbers(rows, "effort", names), expected)
-    assert not any(column.startswith("reference") for column in rows[0])
-    times = [(state.stamp_ns - dropped.states[0].stamp_ns) / 1e9 for state in dropped.states]
-    assert [float(row["time_s"]) for row in rows] == pytest.approx(times, abs=1e-12)
-    assert [row["episode"] for row in rows] == ["1"] * (RESET_AFTER + 1) + ["2"] * 6
-    began = rows[RESET_AFTER + 1]
-    assert {began[column] for column in began if column.startswith("effort.")} == {""}
+    motion, recording = read_bvh(file), read_recording(bag)
+    assert motion.frame_time == pytest.approx(1.0 / 60.0)  # of 240 Hz, every fourth state
+    assert len(motion.values) == 4
+    expected = 100.0 * recording.position[[12, 16, 20, 24], :3][:, TO_FILE]
+    np.testing.assert_allclose(motion.values[:, :3], expected, atol=1e-5)
 
 
-def test_the_reference_comes_by_request(dropped: Eventful, tmp_path: Path) -> None:
-    bag, file = write_timed(tmp_path / "bag", dropped.messages()), tmp_path / "states.csv"
+def test_nothing_lies_between_two_episodes(bag: Path) -> None:
+    motion = of_recordings((read_recording(bag),))
+    (trajectory,) = motion.characters
+    step = 1.0 / 240.0
+    around = (RESET_AFTER + np.array((0.4, 0.6))) * step
 
-    exported(bag, "--output", file, "--reference")
+    poses = motion.link_poses(trajectory, around)
 
-    rows, names = table(file), dropped.plan.character.layout.dof_names
-    desired = {reference.stamp_ns: reference for reference in dropped.references}
-    missing = np.full(len(names), np.nan)
-    for kind in ("position", "velocity"):
-        expected = np.array(
-            [
-                getattr(desired[s.stamp_ns], kind) if s.stamp_ns in desired else missing
-                for s in dropped.states
-            ]
-        )
-        np.testing.assert_array_equal(numbers(rows, f"reference_{kind}", names), expected)
-    assert np.isnan(numbers(rows, "reference_position", names)[-1]).all()  # nobody answered it
+    expected = motion.link_poses(trajectory, (RESET_AFTER + np.array((0.0, 1.0))) * step)
+    np.testing.assert_allclose(poses.origins, expected.origins, atol=1e-9)
 
 
-def test_a_file_is_not_overwritten_unasked_and_what_cannot_be_written_is_one_line(
+@pytest.mark.parametrize("order", ["ZXY", "ZYX"])
+def test_a_clip_by_name_or_file_is_the_same_motion(tmp_path: Path, order: str) -> None:
+    by_name, by_file = tmp_path / "name.bvh", tmp_path / "file.bvh"
+    path = clip_path(character("humanoid"), "cartwheel")
+
+    assert exported("cartwheel", "--output", by_name, "--order", order) == 0
+    assert exported(path, "--output", by_file, "--order", order, "--character", "humanoid") == 0
+
+    assert by_name.read_bytes() == by_file.read_bytes()
+    channels = read_bvh(by_name).skeleton.channels[0]
+    assert "".join(channel[0] for channel in channels[3:]) == order
+
+
+def test_of_two_worlds_one_is_named(
     pendulum: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    bag, file = write_bag(tmp_path / "bag", pendulum.messages()), tmp_path / "states.csv"
-    for nowhere in ("nowhere/states.csv", "."):
-        assert exported(bag, "--output", tmp_path / nowhere) == 1
-        output = capsys.readouterr().err
-        assert output.startswith("error: cannot write") and output.count("\n") == 1
-    file.write_text("mine")
-
-    assert exported(bag, "--output", file) == 1
-    assert capsys.readouterr().err == f"error: {file} exists already; --overwrite replaces it\n"
-    assert file.read_text() == "mine"
-
-    assert exported(bag, "--output", file, "--overwrite") == 0
-    assert len(table(file)) == len(pendulum.states)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", "states.csv"]
-
-
-def test_one_of_several_characters_is_named(
-    pendulum: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = tmp_path / "states.csv"
     with BagWriter(tmp_path / "bag") as bag:
         for namespace in ("left", "right"):
             add_to(bag, pendulum.messages(), namespace)
+    file = tmp_path / "one.glb"
 
-    assert exported(tmp_path, "--output", file) == 1
-    output = capsys.readouterr().err
-    assert "left" in output and "right" in output and output.count("\n") == 1
-    assert not file.exists()
-    assert exported(tmp_path, "--output", file, "--character", "left") == 0
-    assert len(table(file)) == len(pendulum.states)
+    assert "several worlds" in refused(capsys, tmp_path, "--output", file)
+    assert exported(tmp_path, "--output", file, "--character", "right") == 0
+    assert_valid(Gltf.of_glb(file.read_bytes()))
+
+
+def test_a_world_of_two_gives_both_and_bvh_one_of_them(
+    pendulum: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names, states = ("left", "right"), raw_states(pendulum.plan, pendulum.states)
+    with BagWriter(tmp_path / "bag") as bag:
+        for name in names:
+            add_to(bag, [raw_configuration(pendulum.plan, name, names), *states], name)
+    both, one = tmp_path / "both.glb", tmp_path / "one.bvh"
+
+    assert exported(tmp_path, "--output", both) == 0
+    gltf = Gltf.of_glb(both.read_bytes())
+    assert_valid(gltf)
+    link = pendulum.plan.character.links[-1].name
+    left, right = (gltf.poses(0.05)[gltf.node(f"{name}_{link}")] for name in names)
+    np.testing.assert_array_equal(left, right)
+    assert "by --character: left, right" in refused(capsys, tmp_path, "--output", one)
+    assert exported(tmp_path, "--output", one, "--character", "left") == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("walk", "--output", "walk.fbx"), (".csv", ".bvh", ".glb", "walk.fbx")),
+        (("walk", "--output", "nowhere/walk.glb"), ("nowhere", "does not exist")),
+        (("walk", "--output", "walk.glb", "--units", "cm"), ("--units", "BVH")),
+        (("walk", "--output", "walk.bvh", "--ground"), ("--ground", "glTF")),
+        (("walk", "--output", "walk.csv", "--order", "XYZ"), ("--order is of BVH; walk.csv",)),
+        (("walk", "--output", "walk.csv", "--from", "0"), ("--from is of BVH and glTF; walk.csv",)),
+        (("walk", "--output", "walk.glb", "--reference"), ("--reference is of CSV; walk.glb",)),
+        (("walk", "--output", "walk.csv", "--reference"), ("--reference is of a run; walk",)),
+        (("walk", "--output", "walk.csv", "--topic", "/a"), ("--topic", "of a bag")),
+        (("wlak", "--output", "walk.bvh"), ("wlak", "walk")),
+        (("nowhere/run", "--output", "walk.bvh"), ("nowhere/run",)),
+        (("nowhere.mcap", "--output", "walk.bvh"), ("nowhere.mcap",)),
+        (("nowhere.txt", "--output", "walk.bvh"), ("nowhere.txt",)),
+        (("walk", "--output", "walk.bvh", "--character", "r3d3"), ("r3d3",)),
+        (("walk", "--output", "walk.bvh", "--from", "1", "--to", "0.5"), ("from 1 s to 0.5 s",)),
+        (("walk", "--output", "walk.bvh", "--to", "9"), ("to 9 s", "1.2")),
+        (("walk", "--output", "walk.bvh", "--from", "nan"), ("nan",)),
+        (("walk", "--output", "walk.bvh", "--fps", "0"), ("0 frames a second", "positive")),
+        (("walk", "--output", "walk.bvh", "--fps", "nan"), ("nan", "positive")),
+        (("walk", "--output", "walk.bvh", "--fps", "1e9"), ("100000 or fewer",)),
+    ],
+    ids=lambda value: " ".join(value[1:]) if "--output" in value else "",
+)
+def test_what_cannot_be_is_one_line(
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    line = refused(capsys, *arguments)
+
+    assert all(part in line for part in parts), line
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_bag_without_states_is_one_line(
+    dropped: Eventful, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    messages = [each for each in dropped.messages() if each[0][0] is not topics.JOINT_STATES]
+    bag = write_timed(tmp_path / "bag", messages)
+
+    assert "bag" in refused(capsys, bag, "--output", tmp_path / "motion.glb")
+
+
+def test_a_world_without_a_plane_has_no_ground(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = write_bag(tmp_path / "bag", make_run("pendulum", 0.02, terrain="none").messages())
+
+    assert "no plane" in refused(capsys, bag, "--output", tmp_path / "motion.glb", "--ground")
+    assert exported(bag, "--output", tmp_path / "motion.glb") == 0
+
+
+def test_a_full_disk_leaves_what_was_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "walk.glb"
+    file.write_text("mine")
+
+    assert "exists already" in refused(capsys, "walk", "--output", file)
+    with file_size_limit(100_000):  # enough for the copy of the URDF that is loaded
+        line = refused(capsys, "walk", "--output", file, "--overwrite")
+
+    assert line == f"error: cannot write {file}: File too large\n"
+    assert file.read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
+    assert exported("walk", "--output", file, "--overwrite") == 0
+    assert_valid(Gltf.of_glb(file.read_bytes()))
+
+
+def test_a_single_file_of_a_bag_will_do(bag: Path) -> None:
+    (file,) = bag.glob("*.mcap")
+
+    assert len(read_source(str(file)).times) == len(read_source(str(bag)).times)

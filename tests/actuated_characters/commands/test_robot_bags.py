@@ -90,10 +90,10 @@ def test_report_says_what_is_known_and_no_more(bag: Path, robot: str) -> None:
 
     page = (bag.with_name("bag-report") / "index.html").read_text()
     words = unescape(re.sub("<[^>]*>", " ", re.sub('data:[^"]*', "", page)))
-    assert "41 states of '/joint_states' over 2 s." in words
+    assert "41 states of '/joint_states' over 2 s, 20 a second." in words
     assert re.search(r"shoulder\s+rad\s+-0\.99\S*\s+\S+\s+0\.99\S*\s+-2\s+2", words)
     assert re.search(r"wheel\s+rad\s+0\s+1\s+2\s+-\s+-", words)  # without limits
-    assert re.search(r"mean rate\s+20 Hz", words)
+    assert f"view {bag} --character {robot}" in words  # shows the rest
     for unknown in ("state_hash", "fell", "nan", "None", "control law"):
         assert unknown not in words
     assert main(["report", str(bag), "--character", robot, "--stills", "0"]) == 0  # replaces it
@@ -101,11 +101,11 @@ def test_report_says_what_is_known_and_no_more(bag: Path, robot: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["glb", "bvh"])
-def test_motion_export_writes_it(suffix: str, bag: Path, robot: str, tmp_path: Path) -> None:
+def test_export_writes_it(suffix: str, bag: Path, robot: str, tmp_path: Path) -> None:
     file = tmp_path / f"robot.{suffix}"
     options = ["--character", robot, "--output", str(file)]
 
-    assert main(["motion", "export", str(bag), *options]) == 0
+    assert main(["export", str(bag), *options]) == 0
 
     if suffix == "bvh":
         frames = file.read_text().partition("Frame Time:")[2].split("\n")[1:]
@@ -136,7 +136,8 @@ def test_view_shows_it(described: Path, bag: Path, robot: str, processes: Proces
         ("render", "BAG"),
         ("report", "BAG"),
         ("view", "BAG"),
-        ("motion", "export", "BAG", "--output", "robot.glb"),
+        ("export", "BAG", "--output", "robot.glb"),
+        ("export", "BAG", "--output", "states.csv"),
     ],
     ids=" ".join,
 )
@@ -162,7 +163,6 @@ def test_without_a_character_it_says_what_to_give(
         ("replay", "BAG"),
         ("fork", "BAG", "--at", "1"),
         ("compare", "BAG", "BAG"),
-        ("export", "BAG", "--output", "states.csv"),
     ],
     ids=" ".join,
 )
@@ -179,9 +179,7 @@ def test_commands_of_runs_say_what_the_bag_is_and_which_commands_take_it(
 
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: bag ")
-    assert (
-        "has joint states on /joint_states: `view`, `render`, `report` and `motion export`" in line
-    )
+    assert "has joint states on /joint_states: `view`, `render`, `report` and `export`" in line
     assert "--character ROBOT.urdf --topic TOPIC" in line
 
 
@@ -200,7 +198,7 @@ def test_options_of_a_bag_are_refused_where_there_is_none(
 ) -> None:
     output = str(tmp_path / "walk.bvh")
 
-    assert main(["motion", "export", "walk", "--topic", "/a", "--output", output]) == 1
+    assert main(["export", "walk", "--topic", "/a", "--output", output]) == 1
     assert main(["view", "--topic", "/a"]) == 1
 
     lines = capsys.readouterr().err.splitlines()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recordings
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands, replay_states
 from actuated_characters.runs.bare_loop import ticks_in_process

@@ -101,7 +101,7 @@ def test_a_recording_that_does_not_say_all_is_refused(
     recording = read_recording(run)
     parameters = {**recording.parameters, **change.pop("parameters", {})}
     changed = replace(recording, parameters=parameters, **change)
-    monkeypatch.setattr(module, "read_recordings", lambda path: (changed,))
+    monkeypatch.setattr(module, "read_recordings", lambda path, begin=None: (changed,))
 
     assert expected in refusal(capsys, run, "--at", "0.1")
 
@@ -109,7 +109,7 @@ def test_a_recording_that_does_not_say_all_is_refused(
 def test_several_characters_are_refused(
     run: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def twice(path: Path) -> tuple[Recording, ...]:
+    def twice(path: Path, begin: object = None) -> tuple[Recording, ...]:
         return (*read_recordings(path), *read_recordings(path))
 
     monkeypatch.setattr(module, "read_recordings", twice)

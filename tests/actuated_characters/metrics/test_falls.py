@@ -9,8 +9,8 @@ import actuated_characters as ac
 from actuated_characters.metrics.falls import (
     FALLEN_TIME,
     FallWatch,
-    Posture,
     PostureReader,
+    PostureSeries,
     fall_row,
     is_down,
     reader_for,
@@ -38,13 +38,13 @@ POST = """<robot name="post"><link name="post"><inertial><mass value="{mass}"/>
 <collision><geometry><box size="0.1 0.1 {height}"/></geometry></collision></link></robot>"""
 
 
-def posture(height: float, tilt_deg: float = 0.0, rows: int = 1) -> Posture:
+def posture(height: float, tilt_deg: float = 0.0, rows: int = 1) -> PostureSeries:
     angle = math.radians(tilt_deg)
     up = np.array((math.sin(angle), 0.0, math.cos(angle)))
-    return Posture(np.full(rows, height), np.tile(up, (rows, 1)))
+    return PostureSeries(np.full(rows, height), np.tile(up, (rows, 1)))
 
 
-NOTHING = Posture(np.array((np.nan,)), np.full((1, 3), np.nan))
+NOTHING = PostureSeries(np.array((np.nan,)), np.full((1, 3), np.nan))
 
 
 # The measure
@@ -67,7 +67,7 @@ NOTHING = Posture(np.array((np.nan,)), np.full((1, 3), np.nan))
     ],
 )
 def test_it_is_down_where_it_is_low_or_tilted_against_what_it_should_be(
-    body: Posture, desired: Posture, down: bool
+    body: PostureSeries, desired: PostureSeries, down: bool
 ) -> None:
     assert is_down(body, desired, standing_height=0.9).tolist() == [down]
 

@@ -14,7 +14,8 @@ from rclpy.serialization import serialize_message
 
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.metrics.error_measures import is_lost
-from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, StateHash, Tick
+from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, Tick
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.metrics.tick_assembler import MOST_AHEAD, TickAssembler
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointLayout, JointType

@@ -367,7 +367,8 @@ def test_the_command_writes_a_file_and_a_table(
 
     code = main(
         [
-            *("reconstruct", "--clip=kick", "--worlds=2", "--kept=1", "--workers=1"),
+            *("motion", "reconstruct", "--clip=kick"),
+            *("--worlds=2", "--kept=1", "--workers=1"),
             f"--output={output}",
             *(f"--set=controller_node.{setting}" for setting in few),
         ]
@@ -417,7 +418,8 @@ def test_a_mistake_is_one_line(
     (tmp_path / "reconstructions").mkdir()
     (tmp_path / "reconstructions" / "humanoid-walk.json").touch()
 
-    code = main(["reconstruct", *options, *(() if "--workers" in options else ("--workers", "1"))])
+    alone = () if "--workers" in options else ("--workers", "1")
+    code = main(["motion", "reconstruct", *options, *alone])
 
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert code == 1
@@ -433,7 +435,7 @@ def test_without_numba_it_says_how_to_get_it(
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "numba", None)
 
-    code = main(["reconstruct", "--output", str(tmp_path / "walk.json")])
+    code = main(["motion", "reconstruct", "--output", str(tmp_path / "walk.json")])
 
     assert code == 1
     assert "pip install 'actuated_characters[plan]'" in capsys.readouterr().err
@@ -445,7 +447,7 @@ def test_ctrl_c_leaves_no_process_and_what_was_found(tmp_path: Path, *, early: b
     few = [f"--set=controller_node.{name}:={value}" for name, value in QUICK.items()]
     process = subprocess.Popen(
         (
-            *(sys.executable, "-m", "actuated_characters.cli", "reconstruct"),
+            *(sys.executable, "-m", "actuated_characters.cli", "motion", "reconstruct"),
             *("--worlds=4", "--workers=2", f"--output={output}", *few),
         ),
         cwd=PROJECT,

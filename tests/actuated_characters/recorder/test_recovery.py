@@ -1,5 +1,6 @@
 """Recovering: what was flushed is in the new bag, whatever became of its writer."""
 
+import json
 import shutil
 import signal
 from collections.abc import Iterator
@@ -408,21 +409,24 @@ def test_the_command_says_what_it_recovered_and_where_the_damaged_bag_is(
 ) -> None:
     run = run_directory(tmp_path)
 
-    assert cli.main(["recover", str(run)]) == 0
+    assert cli.main(["info", str(run), "--recover"]) == 0
 
-    printed = capsys.readouterr().out.replace("\n", " ")
-    assert "/joint_states" in printed
+    output = capsys.readouterr()
+    assert "/joint_states" in output.out
+    printed = output.err.replace("\n", " ")
     assert f"{run / 'bag'}: 242 messages, the last one of 1970-01-01 00:00:00.001000 UTC" in printed
     assert f"the damaged bag: {run / 'bag.damaged'}" in printed
     assert f"figures: {run}" in printed
-    assert cli.main(["recover", str(run)]) == 0
-    assert "is complete (242 messages): nothing to recover" in capsys.readouterr().out
+    assert cli.main(["info", str(run), "--recover", "--json"]) == 0
+    output = capsys.readouterr()
+    assert "is complete (242 messages): nothing to recover" in output.err
+    assert json.loads(output.out)["bag"] == str(run / "bag")
 
 
 @pytest.mark.usefixtures("quiet_signals")
 def test_the_command_says_in_one_line_what_is_wrong(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["recover", str(tmp_path)]) == 1
+    assert cli.main(["info", str(tmp_path), "--recover"]) == 1
 
     assert capsys.readouterr().err.splitlines()[-1].startswith("error: nothing to recover in ")

@@ -17,7 +17,8 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
 from actuated_characters.metrics.recording_metrics import measure_recording
 from actuated_characters.recorder.recovery import recover
-from actuated_characters.report.facts import look_at
+from actuated_characters.report.contents import read_contents
+from actuated_characters.report.ticks import read_ticks
 from msgs_config.messages.clock import TickClock
 from tests.actuated_characters.bags.format.test_mcap_writing import unclosed
 from tests.support.foreign_bags import to_sqlite
@@ -168,17 +169,19 @@ def test_wall_times_of_a_run_are_known_from_mcap(runs: dict[str, Path]) -> None:
     factor = summary_of(runs["mcap"])["real_time_factor"]
     recording = read_recording(runs["mcap"])
     metrics, _ = measure_recording(recording)
-    facts = look_at(runs["mcap"])
+    contents = read_contents(runs["mcap"])
+    whole, (ticks,) = read_ticks(contents)
 
     assert recording.has_wall_times
     # the recorder's begins with the first answer, and that of a recording with the first state
     assert 0.0 < metrics["real_time_factor"] <= factor  # type: ignore[operator]
-    assert facts.streams[0].tick_us and facts.contents.wall_time is not None
-    assert facts.contents.start_ns is not None and facts.contents.start_ns > 10**18
+    assert ticks.tick_us and whole.wall_time_s is not None
+    assert whole.start_ns is not None and whole.start_ns > 10**18
+    assert (contents.start_ns, contents.wall_time_s) == (None, None)  # these are known by reading
 
 
 def test_wall_times_that_sqlite_cannot_hold_are_not_invented(
-    runs: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    runs: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     run = runs["sqlite3"]
     recording = read_recording(run)
@@ -186,16 +189,12 @@ def test_wall_times_that_sqlite_cannot_hold_are_not_invented(
 
     assert not recording.has_wall_times
     assert metrics["wall_time_s"] is None and metrics["real_time_factor"] is None
-    facts = look_at(run)
-    (stream,) = facts.streams
-    assert not stream.tick_us and not stream.pauses and not stream.late
-    assert (facts.contents.wall_time, facts.contents.start_ns) == (None, None)
-    assert {(t.rate_hz, t.largest_gap) for t in facts.contents.topics if t.count} == {(None, None)}
+    contents, (ticks,) = read_ticks(read_contents(run))
+    assert not ticks.tick_us and not ticks.pauses and not ticks.late
+    assert (contents.wall_time_s, contents.start_ns) == (None, None)
+    assert {topic.largest_gap_s for topic in contents.topics} == {None}
     assert main(["info", str(run)]) == 0
     assert "unknown, log times are simulated" in capsys.readouterr().out
-    assert main(["report", str(run), "--output", str(tmp_path / "report")]) == 0
-    page = (tmp_path / "report" / "index.html").read_text()
-    assert "Wall times are not known: log times are simulated" in page
 
 
 def test_a_recovered_bag_is_measured_as_before(runs: dict[str, Path], tmp_path: Path) -> None:

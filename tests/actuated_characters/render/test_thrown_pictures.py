@@ -8,13 +8,7 @@ import pytest
 from actuated_characters.bags.recording import ModeChange, Recording
 from actuated_characters.render.engine.renderer import Renderer
 from actuated_characters.render.scene import make_scene
-from actuated_characters.report.reactions import (
-    ModeSpan,
-    mode_line,
-    mode_spans,
-    throw_marks,
-    thrown_line,
-)
+from actuated_characters.report.events import mode_events, throw_events
 from lecture.framework.study import RunSpec
 from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
 from msgs_config.messages.throw import ProjectileThrow
@@ -125,14 +119,14 @@ def test_a_ball_behind_the_character_is_hidden() -> None:
 
 
 def test_each_ball_is_told_when_it_was_let_go(recording: Recording) -> None:
-    marks = throw_marks(recording)
+    events = throw_events(recording)
 
-    assert [(mark.name, mark.start) for mark in marks] == [
+    assert [(event.text.split()[0], event.start) for event in events] == [
         ("ball_1", pytest.approx(1 / 240.0)),
         ("ball_1", pytest.approx(3 / 240.0)),  # of the next episode
         ("ball_2", pytest.approx(4 / 240.0)),
     ]
-    assert thrown_line(marks[0]) == "ball_1 thrown: 2 kg, radius 0.1 m, 5 m/s"
+    assert events[0].text == "ball_1 thrown: 2 kg, radius 0.1 m, 5 m/s"
 
 
 def test_a_mode_lasts_until_the_next_one_or_the_end(recording: Recording) -> None:
@@ -143,14 +137,13 @@ def test_a_mode_lasts_until_the_next_one_or_the_end(recording: Recording) -> Non
         ModeChange(stamps[4], "LIMP", {}),
     )
 
-    spans = mode_spans(replace(recording, modes=changes))
+    events = mode_events(replace(recording, modes=changes))
 
     tick = pytest.approx
-    assert [(span.mode, span.start, span.duration) for span in spans] == [
+    assert [(event.label, event.start, event.duration) for event in events] == [
         ("TRACK", 0.0, tick(1 / 240.0, abs=1e-8)),
         ("REACT", tick(1 / 240.0, abs=1e-8), tick(3 / 240.0, abs=1e-8)),
         ("LIMP", tick(4 / 240.0, abs=1e-8), tick(1 / 240.0, abs=1e-8)),
     ]
-    line = mode_line(ModeSpan("REACT", 1.0, 0.25, {"link": "chest", "impulse": 19.79123}))
-    assert line == "REACT for 0.25 s: link chest, impulse 19.79"
-    assert mode_spans(replace(recording, modes=())) == []
+    assert events[1].text == "REACT for 0.0125 s: link chest, impulse 19.79"
+    assert mode_events(replace(recording, modes=())) == []

@@ -14,12 +14,11 @@ from actuated_characters.metrics.equation_of_motion import EquationOfMotion
 from actuated_characters.metrics.recording_metrics import contact_series, measure_recording
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands, replay_states
-from actuated_characters.report.changes import live_changes
+from actuated_characters.report.events import change_events
 from actuated_characters.viewer.recorded.plots import curves
 from controller_node import parameters as controller
 from controller_node.references.factory import make_motion
 from msgs_config.messages.configuration import SINCE
-from msgs_config.parameters import resolve
 from tests.support.changed_episodes import (
     BEGINS,
     MOON,
@@ -62,7 +61,7 @@ def begin_of(clip: str) -> np.ndarray:
     """The position (n,) in which a clip of the humanoid begins."""
     humanoid = character("humanoid")
     given = {"character": "humanoid", "reference": "clip", "clip": clip}
-    values = resolve(controller.PARAMETERS + controller.character_parameters(humanoid), given)
+    values = controller.resolve_for(humanoid, given)
     return make_motion(humanoid, values).first_state().position
 
 
@@ -149,7 +148,8 @@ def test_a_fork_without_a_change_is_the_original(run: Path) -> None:
 
 
 def test_changes_are_listed(recording: Recording) -> None:
-    found = [(each.name, each.before, each.after) for each in live_changes(recording)]
+    events = change_events(recording)
+    found = [tuple(event.facts.values()) for event in events]
 
     changes: list[tuple[str, object, object]] = [
         ("gravity", 9.81, MOON),
@@ -160,16 +160,14 @@ def test_changes_are_listed(recording: Recording) -> None:
         ("library", [], ["walk"]),
     ]
     assert [change for change in changes if change not in found] == []
-    times = {each.name: each.time for each in live_changes(recording)}
+    times = {event.facts["name"]: event.start for event in events}
     assert times["solver_iterations"] == pytest.approx((BEGINS[3] - 1) / 240)
 
 
 def test_info_and_report_tell_of_changes(run: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(run), "--json"]) == 0
-    told = json.loads(capfd.readouterr().out)["runs"][0]["changes"]
-    assert {"name": "gravity", "before": 9.81, "after": MOON} in [
-        {key: change[key] for key in ("name", "before", "after")} for change in told
-    ]
+    assert main(["info", str(run), "--ticks", "--json"]) == 0
+    told = json.loads(capfd.readouterr().out)["runs"][0]["events"]
+    assert {"name": "gravity", "before": 9.81, "after": MOON} in [each["facts"] for each in told]
     page = run.parent / "page"
     assert main(["report", str(run), "--output", str(page)]) == 0
     assert f"gravity: 9.81 to {MOON}" in (page / "index.html").read_text()

@@ -16,7 +16,7 @@ from actuated_characters.bags.recording import (
     read_recordings,
 )
 from actuated_characters.bags.writer import BagWriter
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.replay.comparison import Difference
 from actuated_characters.replay.effort_check import check_commands
 from actuated_characters.replay.replay import replay, tick_count

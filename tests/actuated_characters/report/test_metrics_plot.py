@@ -8,7 +8,6 @@ import pytest
 from actuated_characters.cli import main
 from actuated_characters.metrics.run_metrics import COLUMNS
 from actuated_characters.recorder.run_directory import read_metrics
-from actuated_characters.report.charts import Marks, Timeline, path_chart
 from actuated_characters.report.metrics_plot import describe_metrics, draw_metrics
 
 RUN = ("run", "--in-process", "--duration", "0.2")
@@ -57,19 +56,6 @@ def test_a_lifts_height_is_measured_against_its_target(
     table = capsys.readouterr().out
     assert f"{apart.mean():.4g} │" in table and table.count("- │") == 1  # its base is fixed
     assert not any(name in table for name in ("joint_error", "root_error", "fell_"))
-
-
-def test_the_path_of_the_root_is_seen_from_above_with_equal_axes() -> None:
-    times = np.linspace(0.0, 1.0, 5)
-    position, desired = np.stack([times, 2.0 * times, 3.0 * times], axis=1), np.zeros((5, 3))
-
-    figure = path_chart(Timeline(times, np.zeros(0, dtype=np.intp), Marks()), position, desired)
-
-    (panel,) = figure.axes
-    assert (panel.get_xlabel(), panel.get_ylabel()) == ("x (m)", "y (m)")
-    assert panel.get_legend_handles_labels()[1] == ["simulated", "reference"]
-    assert panel.get_aspect() == 1.0
-    np.testing.assert_array_equal(panel.lines[0].get_xydata(), position[:, :2])
 
 
 def test_a_run_without_a_tick_has_a_plot_too() -> None:

@@ -15,7 +15,7 @@ from rclpy.context import Context
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
-from actuated_characters.metrics.run_metrics import StateHash
+from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.processes import MODULES
 from msgs_config.character.loading import load_character
@@ -210,7 +210,7 @@ def test_root_that_is_not_commanded_switches_assistance_off() -> None:
 
     plan = make_plan("humanoid", 2.0, {"reference": "hold"}, {"commanded_joints": joints}, {})
 
-    assert plan.controller.flag("root_assistance") is False
+    assert plan.controller["root_assistance"] is False
 
 
 def test_two_runs_at_once_take_different_domains_and_do_not_hear_each_other(
@@ -435,15 +435,3 @@ def test_a_node_that_is_killed_ends_the_run_and_is_named(
     assert run.family == {}
     if node != "recorder":
         assert len(list(read_messages(tmp_path / "run" / "bag", ["/joint_states"]))) > 50
-
-
-# What there is to run
-
-
-def test_the_list_shows_characters_and_clips(processes: Processes) -> None:
-    listing = processes.command("list", environment={**os.environ, "COLUMNS": "300"})
-
-    assert listing.wait() == 0
-    for name in ("humanoid", "franka_panda", "lift", "pendulum", "walk", "backflip", "cartwheel"):
-        assert name in listing.stdout
-    assert "34, floating base" in listing.stdout

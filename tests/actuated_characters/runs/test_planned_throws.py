@@ -34,8 +34,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
+from sim_node.physics.balls.sphere_sweep import find_impact
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.sphere_sweep import find_impact
 from tests.support.physics import character
 from tests.support.runs import run_plan
 from tests.support.thrown_states import watch_states
@@ -146,14 +146,14 @@ def test_a_ball_flies_at_its_speed_and_upwards_as_gravity_takes_away(
     simulator: dict[str, object],
 ) -> None:
     plan = plan_of(**simulator)
-    rate = plan.simulator.integer("rate")
+    rate = plan.simulation.rate_hz
 
     planned, _ = plan_throw(plan, ThrowRequest(1.0, 5.0, 0.9, "neck", "right", 3.0, 0.06))
 
     vx, vy, vz = planned.throw.velocity
     time = 0.9 - (TickClock(rate).first_tick_from(planned.stamp_ns) - 1) / rate
-    step = 1.0 / (rate * plan.simulator.integer("substeps"))
-    gravity = plan.simulator.number("gravity")
+    step = 1.0 / (rate * plan.simulation.substeps)
+    gravity = plan.simulation.world.gravity
     assert (vx, vy) == pytest.approx((0.0, 5.0), abs=1e-9)
     assert vz == pytest.approx(0.5 * gravity * (time + step), abs=1e-9)
     # it comes to the neck's surface, which is half a hand from its middle

@@ -9,13 +9,11 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
-from actuated_characters.report.reactions import mode_spans
+from actuated_characters.report.events import mode_events
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
-from benchmarks.athletics.trial import Trial, moments
-from controller_node.behaviours.state_machine.file import read_machine
 from lecture.athletics.measures import longest_flight
 from msgs_config.messages import topics
 from tests.support.ros import Processes, SimulatorClient, tick_of
@@ -38,7 +36,7 @@ def test_a_run_is_replayed_to_the_bit(tmp_path: Path, monkeypatch: pytest.Monkey
 
     recording = read_recording(tmp_path / "run")
     assert recording.position[-1, 0] - recording.position[0, 0] > 0.2
-    labels = [span.label for span in mode_spans(recording)]
+    labels = [span.label for span in mode_events(recording)]
     assert labels[:4] == ["stand, right", "shift, right", "step, right", "step, left"]
     assert replay([recording]).identical
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
@@ -62,29 +60,10 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
     recording = read_recording(sent)
     start, flight = longest_flight(recording)
     assert 1.6 < start < 1.9 and flight >= 0.25
-    labels = [span.facts["state"] for span in mode_spans(recording)]
+    labels = [span.facts["state"] for span in mode_events(recording)]
     assert labels == ["stand", "crouch", "thrust", "flight", "land", "rest"]
     assert not np.nan_to_num(recording.effort)[:, :6].any()
     assert replay([recording]).identical
-
-
-@pytest.mark.slow
-def test_a_trial_has_the_states_of_a_run() -> None:
-    """What the benchmarks and the search for parameters run is the product, to the bit."""
-    from actuated_characters.runs.bare_loop import ticks_in_process
-
-    trial = Trial(1.6, "0.5,0,0@0.1", ("root:60,0,0@1.1",))
-    machine = read_machine("walk")
-    plan = trial.plan(machine)
-    pushes = [parse_push(text, plan) for text in trial.pushes]
-
-    ticks = [tick.state for tick in ticks_in_process(plan, pushes)]
-    seen = list(moments(trial, machine, plan))
-
-    assert len(seen) == len(ticks) == 384
-    for moment, state in zip(seen, ticks, strict=True):
-        assert (moment.position == state.position).all()
-        assert (moment.velocity == state.velocity).all()
 
 
 def test_the_command_says_what_is_wrong_with_a_machine(processes: Processes) -> None:

@@ -9,8 +9,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from character_motion.clips.importing import import_bvh
-from character_motion.retargeting import goals
-from character_motion.retargeting.capsules import closest_points
+from character_motion.retargeting.optimisation import goals
+from character_motion.retargeting.optimisation.capsules import closest_points
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.character.dynamics import still_model
 from msgs_config.geometry import rotations

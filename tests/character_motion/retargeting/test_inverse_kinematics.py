@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from character_motion.retargeting.inverse_kinematics import Goals, InverseKinematics
+from character_motion.retargeting.optimisation.goals import Goals
+from character_motion.retargeting.optimisation.inverse_kinematics import InverseKinematics
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition

@@ -9,7 +9,7 @@ import pytest
 from actuated_characters.cli import main
 from character_motion.bvh.reading import read_bvh
 from character_motion.clips.importing import ImportedClip, import_bvh
-from character_motion.retargeting import inverse_kinematics
+from character_motion.retargeting.optimisation import inverse_kinematics
 from character_motion.retargeting.target_body import TargetBody
 from controller_node.references.clip import ClipReference
 from msgs_config.arrays import FloatArray
@@ -142,7 +142,7 @@ def test_a_long_file_solved_in_windows_is_the_same_as_solved_at_once(
 
 def test_a_file_of_the_own_skeleton_is_taken_as_it_is(tmp_path: Path, target: TargetBody) -> None:
     file = tmp_path / "own.bvh"
-    assert main(["motion", "export", "kick", "--output", str(file), "--units", "cm"]) == 0
+    assert main(["export", "kick", "--output", str(file), "--units", "cm"]) == 0
 
     made = import_bvh(file, target)
 

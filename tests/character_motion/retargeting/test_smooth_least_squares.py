@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from character_motion.retargeting.smooth_least_squares import solve_smooth
+from character_motion.retargeting.optimisation.smooth_least_squares import solve_smooth
 
 
 @pytest.mark.parametrize("frames", [3, 4, 7, 12])

@@ -8,7 +8,7 @@ import pytest
 from actuated_characters.cli import main
 from character_motion.clips.importing import import_bvh
 from character_motion.clips.motion_clip import read_motion_clip
-from character_motion.retargeting.joint_angles import joint_angles
+from character_motion.retargeting.optimisation.joint_angles import joint_angles
 from character_motion.retargeting.target_body import TargetBody
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.loading import load_character

@@ -9,12 +9,12 @@ import pytest
 from controller_node.behaviours.base import BehaviourOutput, Observation
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.behaviours.pursuit import Pursuit
-from controller_node.parameters import PARAMETERS, character_parameters, make_gains
+from controller_node.parameters import make_gains, resolve_for
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
@@ -29,7 +29,7 @@ GIVEN = {"behaviour": "pursuit", "opponent": "other", "pursuit.force": FORCE, "r
 
 
 def values_of(given: Mapping[str, object], whole: Character = HUMANOID) -> Values:
-    return resolve(PARAMETERS + character_parameters(whole), {**GIVEN, **given})
+    return resolve_for(whole, {**GIVEN, **given})
 
 
 class Fighter:

@@ -239,9 +239,9 @@ def test_both_nodes_give_the_states_of_one_process(
         "humanoid",
         max_ticks=plan.ticks,
         wait_for_subscribers=2,
-        commanded_joints=list(values.texts("commanded_joints")),
-        initial_position=list(values.numbers("initial_position")),
-        initial_velocity=list(values.numbers("initial_velocity")),
+        commanded_joints=list(values["commanded_joints"]),
+        initial_position=list(values["initial_position"]),
+        initial_velocity=list(values["initial_velocity"]),
     )
     last = client.spin_until(
         lambda: next((m for m in states.messages if stamp_ns(m) == expected.stamp_ns), None),

@@ -6,7 +6,6 @@ from rclpy.context import Context
 from controller_node import parameters as controller
 from controller_node.references.factory import make_motion
 from msgs_config.messages import topics
-from msgs_config.parameters import resolve
 from tests.support.physics import character
 from tests.support.ros import Processes, SimulatorClient
 
@@ -17,7 +16,7 @@ CLIPS = ("run", "walk") * 5
 def begin_of(clip: str) -> list[float]:
     """The position (n,) in which a clip begins."""
     given = {"character": "humanoid", "reference": "clip", "clip": clip}
-    values = resolve(controller.PARAMETERS + controller.character_parameters(HUMANOID), given)
+    values = controller.resolve_for(HUMANOID, given)
     position: list[float] = make_motion(HUMANOID, values).first_state().position.tolist()
     return position
 

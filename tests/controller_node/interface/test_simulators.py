@@ -14,7 +14,6 @@ from msgs_config.bus.composition import ros_node
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.state import StampedState
-from msgs_config.parameters import resolve
 from sim_node import parameters as of_simulator
 from sim_node.physics.probe import measure_probe
 from tests.support.physics import character
@@ -28,8 +27,7 @@ MOON = 1.62  # m/s^2
 
 def described(gravity: float) -> String:
     """The configuration of a simulator of the pendulum."""
-    declared = of_simulator.PARAMETERS + of_simulator.character_parameters(PENDULUM)
-    values = resolve(declared, {"character": "pendulum", "gravity": gravity})
+    values = of_simulator.resolve_alone(PENDULUM, {"character": "pendulum", "gravity": gravity})
     probe = measure_probe(PENDULUM, gravity)
     return String(data=configuration.describe(PENDULUM, values, probe=probe, session=SESSION))
 
@@ -112,7 +110,7 @@ def test_a_configuration_that_comes_just_before_a_first_state_counts_for_it(
     bench.publish_configuration(gravity=9.81)
     bench.publish_first_state(1)
     assert bench.until(lambda: bench.torques(1), "an answer") == expected(1, 9.81)
-    look, calls = Simulators.look, list[float]()
+    look, calls = Simulators.take_messages, list[float]()
 
     def look_just_before_a_reset(simulators: Simulators, now: float) -> None:
         look(simulators, now)
@@ -121,7 +119,7 @@ def test_a_configuration_that_comes_just_before_a_first_state_counts_for_it(
             bench.publish_configuration(MOON)
             bench.publish_first_state(9)
 
-    monkeypatch.setattr(Simulators, "look", look_just_before_a_reset)
+    monkeypatch.setattr(Simulators, "take_messages", look_just_before_a_reset)
     bench.until(lambda: calls, "the reset")
     bench.node.node.set_own_parameters({"gravity": MOON})
 

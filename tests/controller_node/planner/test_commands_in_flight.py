@@ -9,16 +9,15 @@ import pytest
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import (
-    PARAMETERS,
-    character_parameters,
     check_world,
     make_controller,
+    resolve_for,
 )
 from controller_node.planner.commands_in_flight import CommandsInFlight
 from controller_node.planner.contact_model import ContactModel
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError
-from msgs_config.parameters import Values, resolve
+from msgs_config.parameters import Values
 from tests.support.physics import character, simulation
 
 HUMANOID = character("humanoid")
@@ -146,7 +145,7 @@ def test_a_planner_that_is_told_of_a_delay_keeps_the_motion_with_it() -> None:
 
 def test_a_simulator_with_another_delay_is_one_clear_line() -> None:
     named: dict[str, Any] = {**QUICK, "command_delay_ticks": 1}
-    values = resolve(PARAMETERS + character_parameters(HUMANOID, named), named)
+    values = resolve_for(HUMANOID, named)
 
     with pytest.raises(ConfigurationError, match=r"counts with 'command_delay_ticks' 1, but .* 2;"):
         check_world(values, {"command_delay_ticks": 2})

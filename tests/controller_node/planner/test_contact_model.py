@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from controller_node.control_laws import GainArrays, stable_pd_effort
-from controller_node.parameters import PARAMETERS as CONTROLLER
-from controller_node.parameters import character_parameters, make_controller_settings
+from controller_node.parameters import make_controller_settings, resolve_for
 from controller_node.planner.compiled import linear, mass_matrix, soft_limits
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Desired, RolloutModel
@@ -21,7 +20,6 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.clips.reading import read_clip
 from msgs_config.geometry import rotations
-from msgs_config.parameters import resolve
 from sim_node.physics.passive_forces import PassiveForces
 from tests.support.physics import character
 
@@ -38,7 +36,7 @@ MODEL = ContactModel(HUMANOID, period_s=PERIOD, gravity=9.81, friction=0.45)
 def gains(**given: object) -> GainArrays:
     """The humanoid's gains with a planner."""
     named = {"planner": "predictive", **given}
-    values = resolve(CONTROLLER + character_parameters(HUMANOID, named), named)
+    values = resolve_for(HUMANOID, named)
     return make_controller_settings(HUMANOID, values).gains
 
 

@@ -514,15 +514,9 @@ def test_states_sampled_together_are_those_sampled_one_by_one(clip: str) -> None
         assert all(ours.tobytes() == its.tobytes() for ours, its in pairs)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("walk.bvh", "a BVH file; 'actuated_characters motion import' makes a clip of it"),
-        ("WALK.BVH", "a BVH file"),
-        ("walk.fbx", "an FBX scene; convert it to BVH.*motion import"),
-        ("walk.npz", "arrays of NumPy.*motion import"),
-    ],
-)
-def test_motion_that_is_no_clip_is_said_with_what_to_do(name: str, message: str) -> None:
-    with pytest.raises(ClipError, match=f"not a clip but {message}"):
-        read_clip(HUMANOID, name)
+@pytest.mark.parametrize("name", ["walk.bvh", "WALK.BVH", "walk.fbx"])
+def test_motion_that_is_no_clip_is_said_with_what_to_do(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).touch()
+
+    with pytest.raises(ClipError, match=f"{name} is .*, not a clip; .*motion import"):
+        read_clip(HUMANOID, str(tmp_path / name))

@@ -319,7 +319,7 @@ def test_a_run_of_a_clip_begins_in_its_first_frame_and_moves() -> None:
 def assert_begins(plan: RunPlan, position: FloatArray, velocity: FloatArray) -> None:
     """The plan says so, and so do the engine's first state and the reference beside it."""
     layout = plan.character.layout
-    initial = plan.simulator.numbers("initial_position"), plan.simulator.numbers("initial_velocity")
+    initial = plan.simulator["initial_position"], plan.simulator["initial_velocity"]
     np.testing.assert_allclose(initial[0], position, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(initial[1], velocity, rtol=0.0, atol=1e-12)
     tick = next(iter(ticks_in_process(plan)))

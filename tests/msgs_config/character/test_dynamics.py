@@ -18,7 +18,7 @@ from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.probe import still_settings
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     DAMPED,
     EVERY_CHARACTER,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from msgs_config.character.effort_limits import EffortLimits
+from msgs_config.character.joints.effort_limits import EffortLimits
 from msgs_config.character.layout import JointLayout, JointType
 
 LAYOUT = JointLayout(

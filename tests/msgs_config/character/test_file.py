@@ -249,7 +249,7 @@ def test_a_urdf_may_list_its_links_in_any_order(write: WriteCharacter, listing: 
         joint("wrist", "arm", "hand"),
     )
 
-    links = load_elsewhere(write("urdf: lift.urdf\ninertia: file\n", urdf))["links"]
+    links = load_elsewhere(write("urdf: lift.urdf\ninertia: file\n", urdf))[0]["links"]
 
     assert_depth_first([parent for _, _, parent in links])
     assert {name: links[parent][0] for name, _, parent in links[1:]} == {
@@ -650,7 +650,7 @@ BROKEN = {
 def test_a_broken_urdf_is_refused_by_path(write: WriteCharacter, case: str) -> None:
     path = write("urdf: lift.urdf\ninertia: file\n", BROKEN[case])
 
-    outcome = load_elsewhere(path)
+    (outcome,) = load_elsewhere(path)
 
     line = outcome["refused"]
     assert str(path.parent / "lift.urdf") in line

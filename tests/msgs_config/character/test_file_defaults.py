@@ -145,7 +145,7 @@ def test_a_run_without_collisions_needs_no_meshes_and_repeats(tmp_path: Path) ->
 
     plan = make_plan(str(path), 0.1, {"reference": "hold"}, {}, {"collision": "none"})
 
-    assert plan.simulator.text("collision") == "none"  # set on one side, it counts on both
+    assert plan.simulator["collision"] == "none"  # set on one side, it counts on both
     (moved,) = moved_at_end(plan)
     assert moved == pytest.approx(0.0, abs=1e-12)
     line = refusal(path)

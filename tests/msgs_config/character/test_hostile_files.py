@@ -1,8 +1,9 @@
 """Files from outside are data: whatever they hold, one clear line answers, soon, in little memory.
 
-What could take a process down is read in one of its own.
+What could take a process down is read in one of its own, a family after the other.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,16 @@ def assert_refused(outcome: dict[str, Any], path: Path) -> None:
     assert outcome["mebibytes"] < 150.0
 
 
+def load_family(directory: Path, cases: Mapping[str, tuple[str, str]]) -> dict[str, Any]:
+    """The path and the outcome of each case, of a URDF and the rest of a character's file."""
+    paths = {}
+    for number, (name, texts) in enumerate(cases.items()):
+        (folder := directory / str(number)).mkdir()
+        paths[name] = write_character(folder, *texts)
+    outcomes = load_elsewhere(*paths.values())
+    return {name: (paths[name], each) for name, each in zip(paths, outcomes, strict=True)}
+
+
 # YAML
 
 LEVELS = 9
@@ -54,11 +65,11 @@ YAML = {
 }
 
 
-@pytest.mark.parametrize("case", YAML)
-def test_hostile_yaml_is_refused(tmp_path: Path, case: str) -> None:
-    path = write_character(tmp_path, robot(LINK), YAML[case])
+def test_hostile_yaml_is_refused(tmp_path: Path) -> None:
+    found = load_family(tmp_path, {name: (robot(LINK), text) for name, text in YAML.items()})
 
-    assert_refused(load_elsewhere(path), path)
+    for path, outcome in found.values():
+        assert_refused(outcome, path)
 
 
 # XML
@@ -83,11 +94,11 @@ XML = {
 }
 
 
-@pytest.mark.parametrize("case", XML)
-def test_hostile_xml_is_refused(tmp_path: Path, case: str) -> None:
-    path = write_character(tmp_path, XML[case])
+def test_hostile_xml_is_refused(tmp_path: Path) -> None:
+    found = load_family(tmp_path, {name: (text, "") for name, text in XML.items()})
 
-    assert_refused(load_elsewhere(path), path.with_suffix(".urdf"))
+    for path, outcome in found.values():
+        assert_refused(outcome, path.with_suffix(".urdf"))
 
 
 # Numbers
@@ -128,17 +139,17 @@ def test_what_cannot_be_is_refused(tmp_path: Path, case: str) -> None:
     assert str(path.with_suffix(".urdf")) in refusal(path)
 
 
-@pytest.mark.parametrize("number", ["0", "1e-300", "1e-30", "1e20", "1e30"])
-@pytest.mark.parametrize("inertia", ["file", "shapes"])
-def test_extreme_numbers_do_not_take_the_engine_down(
-    tmp_path: Path, number: str, inertia: str
-) -> None:
+def test_extreme_numbers_do_not_take_the_engine_down(tmp_path: Path) -> None:
     """They may be refused, or make a body that is of no use."""
-    shape = f'<collision><geometry><box size="{number} 1 1"/></geometry></collision>'
-    body = link("a", inertial(number, number) + shape)
-    path = write_character(tmp_path, robot(body), f"inertia: {inertia}\n")
+    cases = {}
+    for number in ("0", "1e-300", "1e-30", "1e20", "1e30"):
+        shape = f'<collision><geometry><box size="{number} 1 1"/></geometry></collision>'
+        body = robot(link("a", inertial(number, number) + shape))
+        for inertia in ("file", "shapes"):
+            cases[f"{number} {inertia}"] = (body, f"inertia: {inertia}\n")
 
-    assert {"refused", "size"} & set(load_elsewhere(path))
+    for name, (_, outcome) in load_family(tmp_path, cases).items():
+        assert {"refused", "size"} & set(outcome), name
 
 
 # Size
@@ -154,27 +165,19 @@ def chain(kind: str, count: int) -> str:
 LARGEST = [("revolute", 121, 127), ("spherical", 30, 96), ("fixed", MAX_JOINTS, 6)]
 
 
-@pytest.mark.parametrize(("kind", "count", "size"), LARGEST)
-def test_a_robot_as_large_as_the_engine_holds_is_taken(
-    tmp_path: Path, kind: str, count: int, size: int
+def test_a_robot_as_large_as_the_engine_holds_is_taken_and_a_larger_one_refused(
+    tmp_path: Path,
 ) -> None:
-    assert load_elsewhere(write_character(tmp_path, chain(kind, count)))["size"] == size
+    """The engine itself would load the larger one, and then read its states as empty."""
+    largest = {kind: (chain(kind, count), "") for kind, count, _ in LARGEST}
+    larger = {f"more {kind}": (chain(kind, count + 1), "") for kind, count, _ in LARGEST}
+    larger["more of thousands"] = (chain("fixed", 10_000), "")
 
+    found = load_family(tmp_path, largest | larger)
 
-@pytest.mark.parametrize(("kind", "count", "size"), LARGEST)
-def test_a_robot_too_large_for_the_engine_is_refused(
-    tmp_path: Path, kind: str, count: int, size: int
-) -> None:
-    """The engine itself would load it, and then read its states as empty."""
-    path = write_character(tmp_path, chain(kind, count + 1))
-
-    outcome = load_elsewhere(path)
-
-    assert_refused(outcome, path.with_suffix(".urdf"))
-    assert f"{MAX_JOINTS} and {MAX_POSITION_ENTRIES}" in outcome["refused"]
-
-
-def test_a_robot_of_thousands_of_links_is_refused(tmp_path: Path) -> None:
-    path = write_character(tmp_path, chain("fixed", 10_000))
-
-    assert_refused(load_elsewhere(path), path.with_suffix(".urdf"))
+    for kind, _, size in LARGEST:
+        assert found[kind][1]["size"] == size, kind
+        assert f"{MAX_JOINTS} and {MAX_POSITION_ENTRIES}" in found[f"more {kind}"][1]["refused"]
+    for kind in larger:
+        path, outcome = found[kind]
+        assert_refused(outcome, path.with_suffix(".urdf"))

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from controller_node.parameters import PARAMETERS, character_parameters
+from controller_node.parameters import PARAMETERS, resolve_for
 from msgs_config.character.file import shipped_characters
 from msgs_config.errors import MessageError
 from msgs_config.messages import configuration
@@ -25,10 +25,8 @@ def test_parameters_that_are_no_mapping_are_refused(parameters: object) -> None:
 @pytest.mark.parametrize("name", shipped_characters())
 def test_a_configuration_is_json_that_any_language_reads_and_says_the_same(name: str) -> None:
     whole = character(name)
-    values = resolve(
-        simulator.PARAMETERS + simulator.character_parameters(whole), {"session": "/a#1"}
-    )
-    of_controller = resolve(PARAMETERS + character_parameters(whole), {})
+    values = simulator.resolve_alone(whole, {"session": "/a#1"})
+    of_controller = resolve_for(whole, {})
 
     text = configuration.describe(whole, values, session="/b#2")
 

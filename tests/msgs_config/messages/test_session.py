@@ -11,16 +11,15 @@ from msgs_config.messages.session import (
     SILENT,
     SILENT_AND_ALONE,
     ForeignSessions,
+    GivenSession,
     OwnSession,
     SessionBinding,
     episode_session,
     episode_text,
-    given_session,
     is_session,
     make_session,
     read_session,
 )
-from msgs_config.parameters import Values
 
 ONE, OTHER, THIRD = "/sim_node#00000000000a", "/sim_node#00000000000b", "/left/sim_node#1"
 SESSIONS = (ONE, OTHER, THIRD, ANONYMOUS)
@@ -56,12 +55,12 @@ def test_an_episode_says_its_number_and_its_session(number: int, session: str) -
 @pytest.mark.parametrize("wrong", ["mine", "#1", "/sim_node#", "/sim node#1", "x#" + "1" * 99])
 def test_a_parameter_that_is_no_id_is_refused_with_an_example(wrong: str) -> None:
     with pytest.raises(ConfigurationError, match=r"'session' is .* such as /sim_node#3fa29c01b7de"):
-        given_session(Values({SESSION.name: wrong}))
+        GivenSession.given({SESSION.name: wrong})
 
 
 def test_an_id_or_nothing_may_be_given() -> None:
-    assert given_session(Values({SESSION.name: ONE})) == ONE
-    assert given_session(Values({SESSION.name: ""})) == ""
+    assert GivenSession.given({SESSION.name: ONE}).id == ONE
+    assert GivenSession.given({}).id == ""
 
 
 # The binding
@@ -74,18 +73,18 @@ class Receiver:
         self.publishers = publishers
         self.binding = SessionBinding(given, lambda: self.publishers)
         self.now = 100.0
-        self.binding.look(self.now)
+        self.binding.note_look(self.now)
 
     def work(self, seconds: float) -> None:
         """Look for messages again and again, and find none."""
         for _ in range(round(seconds / TURN)):
             self.now += TURN
-            self.binding.look(self.now)
+            self.binding.note_look(self.now)
 
     def stand_still(self, seconds: float) -> None:
         """Do not look: the process is stopped."""
         self.now += seconds
-        self.binding.look(self.now)
+        self.binding.note_look(self.now)
 
     def hear(self, session: str) -> bool:
         """Hear a usable state; whether it was taken."""

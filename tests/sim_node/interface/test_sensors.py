@@ -12,8 +12,8 @@ from msgs_config.messages import topics
 from msgs_config.messages.cdr import read_frame_id
 from sim_node import parameters as for_simulator
 from sim_node.interface.sensors import SensorPublishers
-from sim_node.node_settings import make_node_settings
-from sim_node.sensors.readers import SensingSettings, SensorReader, make_readers
+from sim_node.node_settings import NodeSettings, SensingSettings
+from sim_node.sensors.readers import SensorReader, make_readers
 from tests.sim_node.conftest import Join
 from tests.support.physics import LoneSimulation, simulation
 from tests.support.ros import (
@@ -24,7 +24,7 @@ from tests.support.ros import (
     tick_of,
 )
 
-SETTINGS = SensingSettings(1.0 / 240.0, 9.81, 0)
+SETTINGS = SensingSettings(240, 9.81, 0)
 IMU, SOLE = (
     topics.sensor_reading(*each)
     for each in ((SensorType.IMU, "imu/pelvis_imu"), (SensorType.FORCE, "force/left_sole"))
@@ -177,7 +177,7 @@ def test_nothing_is_read_while_there_are_no_subscribers(
     run: LoneSimulation = simulation("humanoid")
     for _, reader in make_readers(run.simulated, SETTINGS):
         monkeypatch.setattr(type(reader), "read", fail)
-    settings = make_node_settings(for_simulator.load_parameters({}).values)
+    settings = NodeSettings.of(for_simulator.load_parameters({}).values)
     node = DdsNode("test_sensors", context=context)
     try:
         publishers = SensorPublishers(node, run.simulated, settings)

@@ -13,7 +13,7 @@ from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.projectiles import decode_balls
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius
-from sim_node.physics.throws import MOST_BALLS
+from sim_node.physics.balls.throws import MOST_BALLS
 from tests.sim_node.conftest import Join
 from tests.support.physics import character, joint_simulation, simulation
 from tests.support.ros import (

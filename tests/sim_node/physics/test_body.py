@@ -11,7 +11,7 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,
     FLOATING_CHARACTERS,

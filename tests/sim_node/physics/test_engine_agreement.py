@@ -16,7 +16,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.passive_forces import PassiveForces
-from sim_node.physics.world import WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,

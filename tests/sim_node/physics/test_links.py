@@ -19,7 +19,8 @@ from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.body import Body
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,

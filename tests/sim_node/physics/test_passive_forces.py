@@ -25,7 +25,8 @@ from sim_node.physics.passive_forces import (
     complementary_forces,
 )
 from sim_node.physics.probe import measure_probe
-from sim_node.physics.world import World, WorldSettings
+from sim_node.physics.settings import WorldSettings
+from sim_node.physics.world import World
 from tests.support.hands import box_link, hinge
 from tests.support.physics import (
     character,

@@ -148,7 +148,7 @@ def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
     ticks = list(ticks_in_process(plan))
 
     # that it has no effort although a law and balance are given
-    assert "root" not in plan.simulator.texts("commanded_joints")
+    assert "root" not in plan.simulator["commanded_joints"]
     assert all(not np.any(tick.following.effort) for tick in ticks)
     assert ticks[-1].following.position[2] < 0.5
     driver = controller("humanoid", behaviour="ragdoll")
@@ -157,14 +157,8 @@ def test_as_a_behaviour_it_has_no_effort_and_falls() -> None:
 
 
 def test_its_law_cannot_be_changed_while_it_runs() -> None:
-    from controller_node.parameters import (
-        PARAMETERS,
-        character_parameters,
-        make_controller_settings,
-    )
-    from msgs_config.parameters import resolve
+    from controller_node.parameters import make_controller_settings, resolve_for
 
-    declared = PARAMETERS + character_parameters(HUMANOID)
-    values = resolve(declared, {"behaviour": "ragdoll", "law": "pd"})
+    values = resolve_for(HUMANOID, {"behaviour": "ragdoll", "law": "pd"})
 
     assert make_controller_settings(HUMANOID, values).law == "zero"

@@ -11,9 +11,9 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
+from sim_node.physics.settings import STEADY_CONTACTS
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
-from sim_node.world_parameters import STEADY_CONTACTS
 
 TICKS = 36
 CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {

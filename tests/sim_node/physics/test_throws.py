@@ -15,9 +15,9 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import CommandError, ConfigurationError
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius, parse_throw
 from msgs_config.parameters import Values
+from sim_node.physics.balls.throws import MOST_BALLS, ThrowQueue
+from sim_node.physics.settings import WorldSettings
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.throws import MOST_BALLS, ThrowQueue
-from sim_node.physics.world import WorldSettings
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import (
     DATA,

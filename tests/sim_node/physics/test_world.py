@@ -11,8 +11,7 @@ from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
-from sim_node.physics.world import WorldSettings
-from sim_node.world_parameters import STEADY_CONTACTS
+from sim_node.physics.settings import STEADY_CONTACTS, WorldSettings
 from tests.support.physics import (
     LoneWorld,
     advance,

@@ -10,10 +10,10 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.character.sensors import Noise, Sensor, SensorType
 from msgs_config.geometry import rotations
-from msgs_config.parameters import resolve
 from sim_node import parameters as for_simulator
+from sim_node.node_settings import SensingSettings
 from sim_node.sensors.link_motion import LinkKinematics
-from sim_node.sensors.readers import ForceReader, ImuReader, SensingSettings, SensorReader
+from sim_node.sensors.readers import ForceReader, ImuReader, SensorReader
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 from tests.support.physics import (
     FLOATING_TURNED_FRAMES,
@@ -29,7 +29,7 @@ from tests.support.physics import (
 COVARIANCES = slice(4, 13), slice(16, 25), slice(28, 37)
 G = 9.81
 RATE = 240
-SETTINGS = SensingSettings(1.0 / RATE, G, seed=0)
+SETTINGS = SensingSettings(RATE, G, seed=0)
 POSE = ((0.1, -0.2, 0.3), tuple(rotations.exp(np.array((0.3, -1.0, 0.7))).tolist()))
 
 
@@ -68,8 +68,7 @@ def force(values: FloatArray) -> FloatArray:
 
 def of_character(whole: Character, **given: object) -> LoneSimulation:
     """A simulation of a character that is no shipped one."""
-    parameters = for_simulator.PARAMETERS + for_simulator.character_parameters(whole)
-    values = resolve(parameters, given)
+    values = for_simulator.resolve_alone(whole, given)
     return LoneSimulation(make_character_setup(whole, values), make_simulation_settings(values))
 
 
@@ -102,7 +101,7 @@ def test_a_spinning_body_feels_the_centripetal_acceleration_off_its_centre(tmp_p
         initial_position=[0.0, 0.0, 9.0, 0.0, 0.0, 0.0],
         initial_velocity=[0.0, 0.0, 0.0, *spin.tolist()],
     )
-    off_centre = reader(run, imu("box", POSE), SensingSettings(1.0 / rate_hz, G, 0))
+    off_centre = reader(run, imu("box", POSE), SensingSettings(rate_hz, G, 0))
 
     run.advance(np.zeros(6))
     values = read(run, off_centre)
@@ -164,7 +163,7 @@ def test_a_pendulum_feels_the_closed_form() -> None:
     run = simulation("pendulum", rate=rate_hz, initial_position=[angle], initial_velocity=[speed])
     rod = run.simulated.character.links[-1].name
     pose = ((0.0, 0.0, -length), (0.0, 0.0, 0.0, 1.0))
-    sensor = reader(run, imu(rod, pose), SensingSettings(1.0 / rate_hz, G, 0))
+    sensor = reader(run, imu(rod, pose), SensingSettings(rate_hz, G, 0))
 
     run.advance(np.zeros(1))
     values = read(run, sensor)

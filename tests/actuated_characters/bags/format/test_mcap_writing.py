@@ -140,7 +140,7 @@ def test_a_flipped_byte_in_a_message_is_one_clear_line(tmp_path: Path) -> None:
 
     assert str(raised.value) == (
         f"cannot read recording {bag}: bag.mcap: it cannot be read whole: damaged chunk (1); "
-        f"'actuated_characters recover {bag.parent}' keeps what is whole of it"
+        f"'actuated_characters info {bag.parent} --recover' keeps what is whole of it"
     )
 
 

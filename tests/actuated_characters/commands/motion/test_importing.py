@@ -213,10 +213,10 @@ def test_from_bvh_to_clip_to_bvh_joints_stay_where_they_are(
 ) -> None:
     first, clip, second = (tmp_path / name for name in ("a.bvh", "a.json", "b.bvh"))
     options = f"--units {unit} --order {order}"
-    assert main(f"motion export spinkick --output {first} {options}".split()) == 0
+    assert main(f"export spinkick --output {first} {options}".split()) == 0
 
     assert main(f"motion import {first} --output {clip} --no-picture".split()) == 0
-    assert main(f"motion export {clip} --output {second} {options}".split()) == 0
+    assert main(f"export {clip} --output {second} {options}".split()) == 0
 
     places = [forward_kinematics(read_bvh(file)).positions for file in (first, second)]
     metres = 0.01 if unit == "cm" else 1.0

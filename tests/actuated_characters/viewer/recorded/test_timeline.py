@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.viewer.recorded.timeline import Timeline, frame_times, row_at
+from actuated_characters.viewer.recorded.timeline import Playback, frame_times, row_at
 
 TIMES = np.arange(241) / 240.0  # one second
 
 
-def playing(speed: float = 1.0, **fields: object) -> Timeline:
-    timeline = Timeline(TIMES)
+def playing(speed: float = 1.0, **fields: object) -> Playback:
+    timeline = Playback(TIMES)
     timeline.speed = speed
     for name, value in fields.items():
         setattr(timeline, name, value)
@@ -29,7 +29,7 @@ def test_a_time_shows_the_last_state_that_is_not_after_it(time: float) -> None:
 
 @pytest.mark.parametrize("row", [0, 1, 7, 100, 240])
 def test_each_state_is_shown_at_its_own_time(row: int) -> None:
-    timeline = Timeline(TIMES)
+    timeline = Playback(TIMES)
     timeline.seek(float(TIMES[row]))
     assert timeline.row == row
 
@@ -43,7 +43,7 @@ def test_it_plays_at_its_speed(speed: float, row: int) -> None:
 
 
 def test_it_stands_until_it_is_played_and_at_its_end() -> None:
-    timeline = Timeline(TIMES)
+    timeline = Playback(TIMES)
     timeline.advance(0.5)
     assert timeline.row == 0
 

@@ -70,9 +70,9 @@ def test_a_machine_is_read(tmp_path: Path) -> None:
 def test_each_shipped_machine_can_be_planned(name: str) -> None:
     plan = make_plan("humanoid", 1.0, {}, {}, {"behaviour": "state_machine", "machine": name})
 
-    assert plan.controller.text("reference") == "steered"
-    assert "root" not in plan.simulator.texts("commanded_joints")
-    assert plan.simulator.number("contact_breaking_threshold") == 0.1
+    assert plan.controller["reference"] == "steered"
+    assert "root" not in plan.simulator["commanded_joints"]
+    assert plan.simulator["contact_breaking_threshold"] == 0.1
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from controller_node.behaviours.state_machine import laws
-from controller_node.behaviours.state_machine.description import CENTRE, HIP, Placement
+from controller_node.behaviours.state_machine.description import CENTRE, HIP, FootPlacement
 from controller_node.behaviours.state_machine.factory import kit_of
 from controller_node.behaviours.state_machine.file import read_machine
-from controller_node.behaviours.state_machine.footing import ReachingFoot, origin_of
-from controller_node.behaviours.state_machine.leg import FootPose
+from controller_node.behaviours.state_machine.legs.footing import ReachingFoot, origin_of
+from controller_node.behaviours.state_machine.legs.leg import FootPose
 from controller_node.behaviours.state_machine.machine import MachineKit
 from controller_node.behaviours.state_machine.situation import Situation, situation_of
 from controller_node.references.steering.reference import Course
@@ -40,7 +40,7 @@ def moving(kit: MachineKit, speed: float, pitch: float = 0.0) -> Situation:
 def reached(
     kit: MachineKit, at: Situation, time: float, later: float = 0.0, **placement: object
 ) -> FootPose:
-    law = replace(Placement(length=LENGTH, gain=GAIN, stance_time=STANCE_TIME), **placement)  # type: ignore[arg-type]
+    law = replace(FootPlacement(length=LENGTH, gain=GAIN, stance_time=STANCE_TIME), **placement)  # type: ignore[arg-type]
     state = replace(kit.machine.states["flight"], placement=law, duration=0.2)
     origin = origin_of(law, at, kit.legs["left"])
     foot = ReachingFoot.leaving(at.body.feet["left"], origin)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller_node.behaviours.state_machine.leg import FootPose, make_leg
+from controller_node.behaviours.state_machine.legs.leg import FootPose, make_leg
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry.scalars import (

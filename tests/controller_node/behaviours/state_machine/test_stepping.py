@@ -6,7 +6,7 @@ import pytest
 
 from controller_node.behaviours.state_machine.description import State
 from controller_node.behaviours.state_machine.file import read_machine
-from controller_node.behaviours.state_machine.stepping import (
+from controller_node.behaviours.state_machine.legs.stepping import (
     landing_offset,
     least_beside,
     nominal_centre,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from controller_node.behaviours.state_machine.leg import make_leg
+from controller_node.behaviours.state_machine.legs.leg import make_leg
 from controller_node.behaviours.state_machine.support import (
     Bounds,
-    Contact,
+    FootContact,
     bounded,
     support_effort,
 )
@@ -23,7 +23,7 @@ LEGS = {
 }
 ANYTHING = Bounds(friction=10.0, spin=10.0, least=0.0, most=9.0)
 PRESSURE: Vector = (0.04, -0.08, 0.0)
-RIGHT = Contact("right", LEGS["right"], 1.0, PRESSURE)
+RIGHT = FootContact("right", LEGS["right"], 1.0, PRESSURE)
 OTHERS = [entry for entry in range(6, SIZE) if entry not in LEGS["right"].entries]
 
 
@@ -52,7 +52,7 @@ def moved(position: np.ndarray, velocity: np.ndarray, time: float) -> DynamicsMo
     return model
 
 
-def support(wanted: np.ndarray, contacts: list[Contact], bounds: Bounds) -> np.ndarray:
+def support(wanted: np.ndarray, contacts: list[FootContact], bounds: Bounds) -> np.ndarray:
     """The effort of the model that moves."""
     model, position, _ = moving_model()
     x, y, z = position[:3].tolist()
@@ -120,7 +120,7 @@ def test_beyond_friction_joints_still_move_as_wanted() -> None:
 
 def test_two_feet_share_the_load() -> None:
     wanted = np.zeros(SIZE)
-    contacts = [Contact(side, LEGS[side], 0.5, PRESSURE) for side in LEGS]
+    contacts = [FootContact(side, LEGS[side], 0.5, PRESSURE) for side in LEGS]
     effort = support(wanted, contacts, ANYTHING)
     joints = [entry for entry in OTHERS if entry not in LEGS["left"].entries]
 

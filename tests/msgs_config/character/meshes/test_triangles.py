@@ -97,7 +97,17 @@ def test_a_file_that_was_written_again_is_read_again(tmp_path: Path) -> None:
     np.testing.assert_allclose(bounds(read_vertices(path)), first * 0.001, rtol=1e-6)
 
 
+def with_nodes_of_nodes(text: str) -> str:
+    """Ten nodes in each of ten in each of ten, and so on, without anything to see."""
+    below = [f'<instance_node url="#n{n}"/>' * 10 for n in range(8)]
+    levels = [f'<node id="n{n}">{inside}</node>' for n, inside in enumerate(["", *below])]
+    library = f"<library_nodes>{''.join(levels)}</library_nodes>"
+    text = text.replace("<library_visual_scenes>", library + "<library_visual_scenes>")
+    return text.replace("<instance_geometry", '<instance_node url="#n8"/><instance_geometry', 1)
+
+
 BROKEN: dict[str, Callable[[str], str]] = {
+    "a thousand million nodes": with_nodes_of_nodes,
     "half a file": lambda text: text[: len(text) // 2],
     "no geometry": lambda text: text.replace("instance_geometry", "instance_camera"),
     "a document type": lambda text: text.replace("<COLLADA", "<!DOCTYPE x><COLLADA", 1),

@@ -1,1 +1,0 @@
-"""What machines can do: trials in the simulator, their figures, and the search for parameters."""

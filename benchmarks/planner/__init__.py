@@ -1,5 +1,0 @@
-"""Measurements of planned motion."""
-
-from benchmarks.support.needed import need
-
-need("planned motion", "plan")

@@ -1,0 +1,1 @@
+"""Many runs, and a table of what became of them: `python -m benchmarks.tables`."""

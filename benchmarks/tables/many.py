@@ -1,0 +1,81 @@
+"""Many runs on some processes, and what became of them as the rows of a table."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from benchmarks.tables.case import Case, Fact
+from benchmarks.tables.seen import Seen, see
+from msgs_config.runtime.process import limit_threads
+from msgs_config.runtime.worker_processes import WorkerProcesses
+
+Measure: TypeAlias = Callable[[Seen], Mapping[str, Fact]]
+Result: TypeAlias = tuple[Case, Mapping[str, Fact]]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is asked of a table."""
+
+    runs: int | None = None  # runs of each row; None: as many as the pages tell of
+    first_seed: int = 1
+    seconds: float | None = None  # length of each run, s; None: that of the pages
+    machine: str = ""
+    folder: Path = Path()  # takes the files of the runs
+
+    def seeds(self, usual: int) -> range:
+        """The seeds of a row."""
+        return range(self.first_seed, self.first_seed + (self.runs or usual))
+
+
+@dataclass(frozen=True)
+class RunTable:
+    """Cases by kind, and what is measured of each."""
+
+    title: str
+    kinds: Sequence[str]
+    cases: Callable[[str, Options], Iterable[Case]]
+    measure: Measure
+    takes_files: bool = False  # whether files may be kinds
+
+
+def attempt(case: Case, measure: Measure) -> Mapping[str, Fact]:
+    """What is measured of a case."""
+    return {**case.facts, **measure(see(case))}
+
+
+def results(cases: Sequence[Case], measure: Measure, processes: int) -> Iterator[Result]:
+    """What becomes of cases, in their order, on some processes.
+
+    Raises:
+        ActuatedCharactersError: a name or a value of a case is wrong.
+        BrokenProcessPool: a process died.
+    """
+    with WorkerProcesses(processes, limit_threads) as pool:
+        waiting = [pool.submit(attempt, case, measure) for case in cases]
+        for case, one in zip(cases, waiting, strict=True):
+            yield case, one.result()
+
+
+def rows(done: Sequence[Result]) -> Iterator[tuple[str, ...]]:
+    """The heading of the table, and a line for each row of the cases."""
+    columns = list(dict.fromkeys(name for _, facts in done for name in facts))
+    yield ("", *columns)
+    for row in dict.fromkeys(case.row for case, _ in done):
+        found = [facts for case, facts in done if case.row == row]
+        yield (row, *(cell([facts.get(name) for facts in found]) for name in columns))
+
+
+def cell(values: Sequence[Fact]) -> str:
+    """Values of several runs in a few words; None is left out."""
+    known = [value for value in values if value is not None]
+    if known and all(isinstance(value, bool) for value in known):
+        return f"{sum(map(bool, known))} of {len(known)}"
+    numbers = [value for value in known if isinstance(value, int | float)]
+    if not numbers:
+        return " ".join(str(value) for value in known)
+    span = f" ({min(numbers):.3g} to {max(numbers):.3g})" if len(numbers) > 1 else ""
+    return f"{np.median(numbers):.3g}{span}"

@@ -1,0 +1,47 @@
+"""Publishes keyframes of a node: all that it goes on from in the state of a stamp."""
+
+import math
+from collections.abc import Callable, Iterator
+
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.publishing import Outgoing, has_subscribers
+from msgs_config.messages.clock import FIRST_TICK, TickClock
+from msgs_config.messages.keyframe import Keyframe, encode_keyframe
+from msgs_config.messages.topic import Topic
+
+_BYTES_PER_SECOND = 60_000
+"""Of keyframes, in simulated time; the other messages of a humanoid take twenty times that."""
+
+
+class KeyframePublisher:
+    """Publishes a keyframe once a period of simulated time, or less often if it is large.
+
+    Simulator and controllers have theirs of the same states. What nobody hears is not made.
+    """
+
+    def __init__(
+        self, node: BusNode, topic: Topic, clock: TickClock, period_s: float, *, at_once: bool
+    ) -> None:
+        """Offer the topic; with a period of 0 there are no keyframes.
+
+        A node that goes on from a keyframe publishes one of its first state, `at_once`.
+        """
+        self._publisher = node.publisher(topic)
+        self._clock, self._period_s, self._at_once = clock, period_s, at_once
+        self._ticks = max(round(period_s * clock.rate_hz), 1)
+
+    def messages(
+        self, stamp_ns: int, session: str, write: Callable[[], bytes]
+    ) -> Iterator[Outgoing]:
+        """The keyframe of a stamp's state, if there is one; `write` makes the memory."""
+        if not self._period_s:
+            return
+        period, remainder = divmod(self._clock.tick(stamp_ns) - FIRST_TICK, self._ticks)
+        is_due = self._at_once or (period and not remainder)
+        if not is_due or not has_subscribers(self._publisher):
+            return
+        raw = encode_keyframe(Keyframe(stamp_ns, session, write()))
+        periods = math.ceil(len(raw) / (self._period_s * _BYTES_PER_SECOND))
+        if self._at_once or period % periods == 0:
+            self._at_once = False
+            yield self._publisher, raw

@@ -1,0 +1,1 @@
+"""What kind of file a robot is in, how it is expanded, and the words that it may have."""

@@ -1,0 +1,85 @@
+"""Processes that work for this one: begun from nothing, deaf to Ctrl-C, and ended with it."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Item = TypeVar("Item")
+
+
+class WorkerProcesses:
+    """A pool for a `with` block, which ends its processes: after an error without their work.
+
+    Where one of them dies, what is asked of the pool is an error,
+    `concurrent.futures.process.BrokenProcessPool`.
+    """
+
+    def __init__(
+        self, count: int, begin: Callable[P, object], *given: P.args, **named: P.kwargs
+    ) -> None:
+        """Each of `count` processes calls `begin`, with what is given, before its first task."""
+        spawn = multiprocessing.get_context("spawn")  # no engine survives a fork
+        self._pool = ProcessPoolExecutor(count, spawn, _begin, (begin, given, named))
+
+    def __enter__(self) -> "WorkerProcesses":
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind not in (None, GeneratorExit):  # nobody waits for what they are at
+            for process in multiprocessing.active_children():
+                process.terminate()
+        self.close()
+
+    def close(self) -> None:
+        """End the processes, each after the task that it is at."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def submit(self, task: Callable[P, T], *given: P.args, **named: P.kwargs) -> Future[T]:
+        """Begin a task, and more processes if there are too few."""
+        with _interrupts_blocked():  # here while processes start, and in them for good
+            return self._pool.submit(task, *given, **named)
+
+    def map(self, task: Callable[[Item], T], items: Iterable[Item]) -> Iterator[T]:
+        """Begin a task for each item; their results in order, as they are asked for."""
+        with _interrupts_blocked():
+            return self._pool.map(task, items)
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Ctrl-C waits; a process that is begun meanwhile leaves it to the one that began it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, handler)
+        if came:  # it reached a thread that had not blocked it
+            signal.raise_signal(signal.SIGINT)
+
+
+def _begin(
+    begin: Callable[..., object], given: tuple[object, ...], named: dict[str, object]
+) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    begin(*given, **named)
+
+
+def _end_with_parent() -> None:
+    """End when the parent is killed, which ends nothing by itself."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,85 @@
+"""The simulator's keyframes: all that it goes on from, published now and then, or given."""
+
+from collections.abc import Iterator
+
+from msgs_config.bus.keyframe_publisher import KeyframePublisher
+from msgs_config.bus.node import BusNode
+from msgs_config.bus.publishing import Outgoing
+from msgs_config.errors import RecordingError
+from msgs_config.memory import MemoryFormat
+from msgs_config.messages import topics
+from msgs_config.messages.keyframe import read_keyframe
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import KeyframeSettings
+from sim_node.physics.simulation import Simulation, Snapshot
+
+_PACKAGES = ("sim_node.physics", "msgs_config.character", "msgs_config.messages")
+
+
+def keyframe_format(simulation: Simulation) -> MemoryFormat:
+    """The form of the keyframes of a simulation that was just made."""
+    return MemoryFormat(_PACKAGES, simulation.settings)
+
+
+def read_memory(memory: bytes, simulation: Simulation) -> tuple[Snapshot, int]:
+    """The state in a keyframe of a simulation like this one, and the stamp of its episode's first.
+
+    Raises:
+        RecordingError: the keyframe is of another simulation.
+    """
+    try:
+        snapshot, episode_ns = keyframe_format(simulation).read(memory)
+        sizes = [len(each.state.position) for each in snapshot.characters]
+        is_one = isinstance(snapshot, Snapshot) and isinstance(episode_ns, int)
+        if is_one and sizes == [each.layout.size for each in simulation.characters]:
+            return snapshot, episode_ns
+    except (TypeError, AttributeError, ValueError) as error:  # whatever a stranger wrote
+        raise RecordingError("a keyframe cannot be used: it is none of a simulator") from error
+    raise RecordingError("a keyframe cannot be used: it is of other characters")
+
+
+class SimulatorKeyframes:
+    """Publishes keyframes of a simulation, and lets it go on from one that is given."""
+
+    def __init__(self, node: BusNode, simulation: Simulation, values: Values, session: str) -> None:
+        """Offer the topic, and read the keyframe that the parameters' values name.
+
+        Raises:
+            ActuatedCharactersError: there is no keyframe in that file.
+        """
+        self._simulation, self._session = simulation, session
+        self._format = keyframe_format(simulation)
+        settings = KeyframeSettings.of(values)
+        self._given = read_keyframe(settings.file) if settings.file else None
+        self.episode_ns = simulation.stamp_ns
+        """Stamp of the first state of the episode."""
+        self._publisher = KeyframePublisher(
+            node,
+            topics.KEYFRAME.of(node.get_name()),
+            simulation.clock,
+            settings.period,
+            at_once=self._given is not None,
+        )
+
+    def go_on(self) -> None:
+        """Go on from the keyframe that is given, if there is one.
+
+        Raises:
+            RecordingError: it is of another simulation.
+        """
+        if self._given is not None:
+            snapshot, self.episode_ns = read_memory(self._given.memory, self._simulation)
+            self._simulation.load_snapshot(snapshot)
+
+    def messages(self) -> Iterator[Outgoing]:
+        """The keyframe of the present state, if it has one.
+
+        While a push acts there is none: it was not recorded for how long it goes on.
+        """
+        simulation = self._simulation
+        pushes = (push for each in simulation.characters for push in each.pushes)
+        if not any(push.acts_at(simulation.tick) for push in pushes):
+            yield from self._publisher.messages(simulation.stamp_ns, self._session, self._memory)
+
+    def _memory(self) -> bytes:
+        return self._format.write((self._simulation.snapshot(), self.episode_ns))
