@@ -1,5 +1,6 @@
 """Fixtures of the tests that start nodes: a ROS domain of their own, processes, clients."""
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -36,6 +37,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     last ones: it would have to make again what they share.
     """
     items.sort(key=lambda item: item.get_closest_marker("sharing") is None)
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector of garbage what lives until the end: thousands of tests, all modules."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

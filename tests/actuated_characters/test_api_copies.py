@@ -31,6 +31,7 @@ def pickled(thing: Copied) -> Copied:
 
 COPY = pytest.mark.parametrize("duplicate", [copy.deepcopy, pickled])
 WITHOUT_ROOT = {"root_assistance": False}
+PLANNER = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
 CONTROLLERS: dict[str, tuple[str, Mapping[str, object], int]] = {
     "hold": ("humanoid", {}, 40),
     "clip": ("humanoid", {"clip": "walk"}, 40),
@@ -42,13 +43,12 @@ CONTROLLERS: dict[str, tuple[str, Mapping[str, object], int]] = {
     "reactive": ("humanoid", {"clip": "walk", "behaviour": "reactive"}, 40),
     "machine": ("humanoid", {"behaviour": "state_machine", "machine": "walk"}, 40),
     "steered": ("humanoid", {"reference": "steered"}, 40),
-    "planner": ("humanoid", {"clip": "walk", "planner": "predictive", "plan.samples": 16}, 14),
+    "planner": ("humanoid", {"clip": "walk", **PLANNER}, 14),
     "late planner": (
         "humanoid",
         {
             "clip": "walk",
-            "planner": "predictive",
-            "plan.samples": 16,
+            **PLANNER,
             "command_delay_ticks": 2,
             "planning_delay_ticks": 6,
         },

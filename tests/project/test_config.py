@@ -286,6 +286,7 @@ def hash_in(directory: Path) -> str:
     return str(summary["state_hash"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", MOTIONS[:2])
 def test_the_nodes_of_a_file_have_the_states_of_a_run(
     processes: Processes, tmp_path: Path, file: str
@@ -326,7 +327,10 @@ def test_nodes_of_one_process_take_a_file_and_have_the_same_states(
     assert replay(read_recordings(tmp_path / "run")).state_hashes == found
 
 
-@pytest.mark.parametrize("turns", range(3))
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "turns", [1, *(pytest.param(turns, marks=pytest.mark.nightly) for turns in (0, 2))]
+)
 def test_the_states_of_two_humanoids_do_not_depend_on_who_starts_first(
     processes: Processes, tmp_path: Path, turns: int
 ) -> None:

@@ -82,8 +82,14 @@ def cpu_ticks(pid: int) -> int:
     return int(fields[11]) + int(fields[12])
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("name", INTERRUPTIBLE)
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        pytest.param(name, number, marks=[] if (at + number) % 2 else pytest.mark.nightly)
+        for at, name in enumerate(INTERRUPTIBLE)
+        for number in (signal.SIGINT, signal.SIGTERM)
+    ],
+)
 def test_an_example_ends_quietly_on_a_signal(
     processes: Processes, client: SimulatorClient, name: str, number: signal.Signals
 ) -> None:

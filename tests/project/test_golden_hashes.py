@@ -10,9 +10,10 @@ TABLE = golden.golden()
 QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
 NIGHTLY = {  # the others hold the same code
     *("planned_reactive_hit", "planned_active_ragdoll_hit", "planned_steered", "planned_backflip"),
+    *("planned_walk", "planned_reactive_hit_short", "planned_backflip_short", "run_machine"),
     *("kick", "spin", "spinkick", "dance_a", "dance_b", "roll", "crawl", "punch", "getup_faceup"),
 }
-OVER_TOPICS = ["reactive_hit", "walk_480_delay", "panda_sine", "walk_reconstructed"]  # of each kind
+OVER_TOPICS = ["panda_sine", "reactive_hit", "walk_480_delay", "walk_reconstructed"]  # of each kind
 
 
 def marks_of(name: str) -> list[pytest.MarkDecorator]:

@@ -57,9 +57,13 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -
 @pytest.mark.parametrize(
     "environment",
     [
-        *({"NPY_DISABLE_CPU_FEATURES": " ".join(FEATURES[at:])} for at in range(len(FEATURES))),
+        {"NPY_DISABLE_CPU_FEATURES": " ".join(FEATURES)},
+        *(
+            pytest.param({"NPY_DISABLE_CPU_FEATURES": " ".join(some)}, marks=pytest.mark.nightly)
+            for some in (FEATURES[at:] for at in range(1, len(FEATURES)))
+        ),
         {"OPENBLAS_CORETYPE": "Nehalem"},
-        {"OPENBLAS_CORETYPE": "Haswell"},
+        pytest.param({"OPENBLAS_CORETYPE": "Haswell"}, marks=pytest.mark.nightly),
     ],
     ids=lambda environment: "-".join(environment.values()).replace(" ", "-"),
 )

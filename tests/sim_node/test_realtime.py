@@ -248,6 +248,7 @@ def kill(process: Process) -> None:
     process.wait()
 
 
+@pytest.mark.slow
 def test_in_real_time_a_controller_that_is_killed_can_be_replaced(
     processes: Processes, client: SimulatorClient
 ) -> None:
@@ -270,6 +271,7 @@ def test_in_real_time_a_controller_that_is_killed_can_be_replaced(
     )
 
 
+@pytest.mark.slow
 def test_in_lockstep_a_controller_that_is_killed_and_replaced_changes_nothing(
     processes: Processes, client: SimulatorClient
 ) -> None:

@@ -11,6 +11,7 @@ import yaml
 
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.execution import run_over_topics
+from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan
 from tests.support.ros import Process, Processes, wait_until
 
@@ -85,6 +86,12 @@ def parameters_of(directory: Path, node: str) -> dict[str, Any]:
     """The parameters that a run has given to a node."""
     content = yaml.safe_load((directory / "parameters" / f"{node}.yaml").read_text())
     return dict(content[node]["ros__parameters"])
+
+
+def run_plan_here(plan: RunPlan, directory: Path, **inputs: Any) -> None:
+    """Run a plan in the test's own process, whose bag is that of a run over topics."""
+    prepare_directory(directory, overwrite=False)
+    run_in_process(plan, directory, **inputs)
 
 
 def run_plan(plan: RunPlan, directory: Path, mark: str = "", **inputs: Any) -> int:

@@ -1,9 +1,10 @@
 """The choices of an option that sets a parameter: those that the parameter's declaration has."""
 
+import argparse
 from collections.abc import Collection, Sequence
 from functools import cached_property
 from importlib import import_module
-from typing import overload
+from typing import Protocol, overload
 
 
 class ParameterChoices(Sequence[str]):
@@ -32,3 +33,17 @@ class ParameterChoices(Sequence[str]):
 
     def __len__(self) -> int:
         return len(self._names)
+
+
+class Options(Protocol):
+    """A parser, or a group of its options."""
+
+    def add_argument(self, *names: str, help: str) -> argparse.Action:
+        """Add an option."""
+        ...
+
+
+def add_choice(options: Options, name: str, choices: ParameterChoices, help: str) -> None:
+    """Add an option with choices, which are looked up when it is given, or for help."""
+    # Given to `add_argument` they would be looked up at once, for a check of the usage.
+    options.add_argument(name, help=help).choices = choices

@@ -2,7 +2,7 @@
 
 import argparse
 
-from actuated_characters.commands.common.parameter_choices import ParameterChoices
+from actuated_characters.commands.common.parameter_choices import ParameterChoices, add_choice
 from actuated_characters.commands.view import add_server
 
 ALL_SENSORS = "all"
@@ -22,9 +22,10 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
     )
-    tracked.add_argument(
+    add_choice(
+        tracked,
         "--reference",
-        choices=ParameterChoices(_CONTROLLER, "reference", without=("clip", "keyframes")),
+        ParameterChoices(_CONTROLLER, "reference", without=("clip", "keyframes")),
         help="the rest pose (hold, the default), a test signal from it, or a walk steered by the "
         "topic cmd_vel",
     )
@@ -34,9 +35,10 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         help="steer: m/s ahead and to the left, rad/s to the left, each from a time in s on; "
         "backward at first: --cmd-vel='-0.4,0,0@1 ...'",
     )
-    run.add_argument(
+    add_choice(
+        run,
         "--behaviour",
-        choices=ParameterChoices(_CONTROLLER, "behaviour"),
+        ParameterChoices(_CONTROLLER, "behaviour"),
         help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
         "get up; react to hits; or go through the states of a machine",
     )
@@ -46,15 +48,17 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         help="walk, or what else a state machine does by joint torques alone, steered by cmd_vel: "
         "a shipped one, such as walk, or a .yaml file (--behaviour state_machine)",
     )
-    run.add_argument(
+    add_choice(
+        run,
         "--collision",
-        choices=ParameterChoices(_SIMULATOR, "collision"),
+        ParameterChoices(_SIMULATOR, "collision"),
         help="what the character collides with: as its file has it (file, the default), or nothing "
         "(none), in which case meshes may be missing",
     )
-    run.add_argument(
+    add_choice(
+        run,
         "--planner",
-        choices=ParameterChoices(_CONTROLLER, "planner", without=("recorded",)),
+        ParameterChoices(_CONTROLLER, "planner", without=("recorded",)),
         help="keep the motion by joint torques alone, planned ahead (predictive: without root "
         "assistance; needs the extra 'plan'), or not (none, the default)",
     )
@@ -74,14 +78,16 @@ def add_viewed(run: argparse.ArgumentParser) -> None:
 def add_recorded(run: argparse.ArgumentParser) -> None:
     """Add the options that say what is recorded, and how."""
     run.add_argument("--no-record", action="store_true", help="write no bag")
-    run.add_argument(
+    add_choice(
+        run,
         "--compression",
-        choices=ParameterChoices(_RECORDER, "compression"),
+        ParameterChoices(_RECORDER, "compression"),
         help="how the bag is compressed (none)",
     )
-    run.add_argument(
+    add_choice(
+        run,
         "--log-time",
-        choices=ParameterChoices(_RECORDER, "log_time"),
+        ParameterChoices(_RECORDER, "log_time"),
         help="clock of the bag's log times (wall); with simulated, players show 20 s as 20 s",
     )
     for name, about in (

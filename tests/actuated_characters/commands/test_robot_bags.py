@@ -16,6 +16,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from actuated_characters.bags.robots.reading import RobotSource, read_any
 from actuated_characters.cli import main
+from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.model import Character
@@ -29,7 +30,7 @@ from tests.support.robot_bags import (
     write_bag,
 )
 from tests.support.ros import Processes, wait_until
-from tests.support.runs import Run
+from tests.support.runs import run_plan_here
 
 pytestmark = pytest.mark.sharing
 
@@ -207,9 +208,10 @@ def test_options_of_a_bag_are_refused_where_there_is_none(
 
 @pytest.mark.slow
 def test_a_run_s_own_bag_read_as_any_robot_s_has_its_links_in_the_same_places(
-    processes: Processes, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
-    Run(processes, "run", "--clip", "walk", "--duration", "0.3", "--output", "run").finish()
+    reference = {"reference": "clip", "clip": "walk"}
+    run_plan_here(make_plan("humanoid", 0.3, reference, {}, {}), tmp_path / "run")
     (run,) = read_any(tmp_path / "run", RobotSource())
 
     (robot,) = read_any(tmp_path / "run", RobotSource(topic="description_joint_states"))

@@ -16,7 +16,7 @@ from msgs_config.messages import topics
 from tests.support.recorded_nodes import (
     record_eventful,
     record_foreign,
-    record_pair,
+    record_pair_in_process,
     record_realtime,
     weakened,
 )
@@ -42,9 +42,19 @@ def folder(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def reactive(folder: Path) -> Path:
-    """A reactive walk that two pushes and a ball hit, over two processes."""
-    assert main(["run", *REACTIVE, "--output", str(folder / "reactive")]) == 0
+    """A reactive walk that two pushes and a ball hit."""
+    assert main(["run", "--in-process", *REACTIVE, "--output", str(folder / "reactive")]) == 0
     return folder / "reactive"
+
+
+@pytest.fixture(scope="module")
+def swings(folder: Path) -> Path:
+    """A pendulum of a file that is there no more."""
+    own = weakened(folder, "pendulum", "hinge", 2.0)
+    given = ("--character", own, "--set", "sim_node.initial_position:=[0.5]", "--duration", "0.3")
+    assert main(["run", "--in-process", *given, "--output", str(folder / "swings")]) == 0
+    Path(own).unlink()
+    return folder / "swings"
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +109,7 @@ def test_a_pushed_fork_is_the_original_up_to_the_push_and_replays(reactive: Path
 
 def test_a_fork_through_topics_sends_the_same_messages(reactive: Path) -> None:
     new = ("--push", "chest:-250,0,0@0.8", "--set", "controller_node.gain_scale.p:=0.8")
+    new = (*new, "--duration", "1.2")
     here, there = (
         fork(reactive, 0.8, *new, *options, name=f"forked{len(options)}")
         for options in ((), ("--through-topics",))
@@ -107,11 +118,9 @@ def test_a_fork_through_topics_sends_the_same_messages(reactive: Path) -> None:
     assert_same_messages(here / "bag", there / "bag")
 
 
-def test_a_fork_says_where_it_comes_from(
-    reactive: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    directory = fork(reactive, 0.5)
-    origin = {"path": str(reactive), "state_hash": hash_of(reactive), "tick": 121, "time": 0.5}
+def test_a_fork_says_where_it_comes_from(swings: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    directory = fork(swings, 0.1)
+    origin = {"path": str(swings), "state_hash": hash_of(swings), "tick": 25, "time": 0.1}
 
     capsys.readouterr()
     assert main(["info", "--json", str(directory)]) == 0
@@ -138,12 +147,12 @@ def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
     [
         pytest.param(("--behaviour", "ragdoll"), marks=pytest.mark.nightly),
         ("--behaviour", "active_ragdoll", "--composed", "--sensor", "all"),
-        ("--planner", "predictive", *QUICK_PLAN),
+        ("--in-process", "--planner", "predictive", *QUICK_PLAN),
         pytest.param(
             ("--set", "sim_node.real_time_factor:=4", "--compression", "zstd"),
             marks=pytest.mark.nightly,
         ),
-        ("--exclude", "contacts", "--exclude", "odom", "--log-time", "simulated"),
+        ("--in-process", "--exclude", "contacts", "--exclude", "odom", "--log-time", "simulated"),
     ],
     ids=" ".join,
 )
@@ -151,15 +160,15 @@ def test_other_runs_come_again_and_go_on(folder: Path, options: tuple[str, ...])
     if "predictive" in options:
         pytest.importorskip("numba")
     original = folder / "original"
-    limits = ("--clip", "walk", "--duration", "0.6", "--push", "chest:400,100,0@0.1")
+    limits = ("--clip", "walk", "--duration", "0.4", "--push", "chest:400,100,0@0.1")
     assert main(["run", *limits, *options, "--output", str(original), "--overwrite"]) == 0
 
-    same = fork(original, 0.3)
+    same = fork(original, 0.2)
     assert hash_of(same) == hash_of(original)
     assert topics_of(original) <= topics_of(same)  # sensors among them
-    changed = fork(original, 0.3, "--push", "chest:0,200,0@0.3")
+    changed = fork(original, 0.2, "--push", "chest:0,200,0@0.2")
 
-    assert first_different(read_recording(original), read_recording(changed)) == 73
+    assert first_different(read_recording(original), read_recording(changed)) == 49
     assert replay(read_recordings(changed)).identical
 
 
@@ -181,6 +190,7 @@ def test_a_parameter_counts_from_the_tick_on_and_a_fork_forks(reactive: Path) ->
     assert hash_of(again) == hash_of(directory)
 
 
+@pytest.mark.nightly
 def test_more_states_than_a_queue_holds_are_compared(folder: Path) -> None:
     original = folder / "long"
     given = ("--set", "sim_node.initial_position:=[0.5]", "--in-process")
@@ -191,14 +201,8 @@ def test_more_states_than_a_queue_holds_are_compared(folder: Path) -> None:
     assert hash_of(fork(original, seconds - 0.1, "--from-start")) == hash_of(original)
 
 
-def test_files_that_are_gone_are_written_again_from_the_recording(folder: Path) -> None:
-    own, original = weakened(folder, "pendulum", "hinge", 2.0), folder / "swings"
-    given = ("--set", "sim_node.initial_position:=[0.5]")
-    options = ["--character", own, "--duration", "0.3", *given, "--output", str(original)]
-    assert main(["run", *options]) == 0
-    Path(own).unlink()
-
-    assert hash_of(fork(original, 0.1)) == hash_of(original)
+def test_files_that_are_gone_are_written_again_from_the_recording(swings: Path) -> None:
+    assert hash_of(fork(swings, 0.1)) == hash_of(swings)
 
 
 def test_a_state_that_is_another_ends_it_with_one_line(
@@ -230,7 +234,7 @@ def test_runs_that_cannot_be_repeated_are_refused(
     reasons = {
         record_foreign(folder): "one that is not controller_node cannot be repeated",
         record_realtime(folder, context): "it ran in real time",
-        record_pair(folder): "it has 2 characters, and a fork repeats a run of one",
+        record_pair_in_process(folder): "it has 2 characters, and a fork repeats a run of one",
     }
     for run, reason in reasons.items():
         assert main(["fork", str(run), "--at", "0.05"]) == 1

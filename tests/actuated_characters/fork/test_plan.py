@@ -69,8 +69,8 @@ def test_a_wrong_option_is_one_line(
 def test_without_a_bag_nothing_can_be_repeated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["run", "--character", "pendulum", "--duration", "0.1", "--no-record"]
-    assert main([*arguments, "--output", str(tmp_path / "run")]) == 0
+    arguments = ["run", "--in-process", "--character", "pendulum", "--duration", "0.1"]
+    assert main([*arguments, "--no-record", "--output", str(tmp_path / "run")]) == 0
     capsys.readouterr()
 
     line = refusal(capsys, tmp_path / "run", "--at", "0.05")

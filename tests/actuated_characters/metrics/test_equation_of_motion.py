@@ -9,6 +9,7 @@ import pytest
 
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion, MotionResidual
+from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
@@ -23,7 +24,7 @@ from tests.support.physics import (
     run_together,
     simulation,
 )
-from tests.support.ros import Processes
+from tests.support.runs import run_plan_here
 
 GRAVITY, RATE = 9.81, 240
 ROUNDING = 1e-10
@@ -286,15 +287,14 @@ def test_what_spinning_friction_does_is_left_over_as_a_torque_about_the_normal(
     assert largest > 1.0
 
 
-# Over topics
+# As it was recorded
 
 
 @pytest.mark.slow
-def test_it_holds_for_what_a_bag_says_of_a_walk(processes: Processes, tmp_path: Path) -> None:
+def test_it_holds_for_what_a_bag_says_of_a_walk(tmp_path: Path) -> None:
     # Arrange
-    walk = ("run", "--clip", "walk", "--duration", "0.5", "--output", str(tmp_path / "walk"))
-    run = processes.command(*walk)
-    assert run.wait(60.0) == 0
+    reference = {"reference": "clip", "clip": "walk"}
+    run_plan_here(make_plan("humanoid", 0.5, reference, {}, {}), tmp_path / "walk")
     recording = read_recording(tmp_path / "walk")
     whole = recording.character
     equation = EquationOfMotion(whole, GRAVITY, RATE)

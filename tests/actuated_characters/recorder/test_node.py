@@ -21,6 +21,7 @@ from std_msgs.msg import Header
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.bags.recording import read_recording
+from actuated_characters.cli import main
 from msgs_config.bus.polling import DirectSubscription
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
@@ -43,6 +44,7 @@ LIMITED = (
     "from actuated_characters.cli import main; sys.exit(main(sys.argv[1:]))"
 )
 MOST_UNACKNOWLEDGED = 1200  # ticks: the simulator looks each 1000
+ENOUGH = 2000  # ticks: some before and after those
 STILL = 1.0  # s without a tick, that say that the simulator waits
 SLOW = 120.0  # s that thousands of ticks may take on a machine that is busy with other things
 BEGIN, END = "before_the_flood", "after_the_flood"  # in no message definition
@@ -181,12 +183,11 @@ def test_a_run_stores_and_compresses_its_bag_as_it_is_told(
 
 
 def test_a_run_records_the_sensors_and_the_states_alone_give_the_same_readings(
-    processes: Processes, tmp_path: Path
+    tmp_path: Path, own_handlers: None
 ) -> None:
-    command = ("run", "--character", "humanoid", "--duration", "0.5", "--output", "run")
-    run = processes.command(*command, "--sensor", "imu/pelvis_imu", "--sensor", "force/right_sole")
-
-    assert run.wait(120.0) == 0, run.stderr
+    command = ("run", "--in-process", "--character", "humanoid", "--duration", "0.5")
+    sensors = ("--sensor", "imu/pelvis_imu", "--sensor", "force/right_sole")
+    assert main([*command, *sensors, "--output", str(tmp_path / "run")]) == 0
 
     # Arrange: the states in the bag, one after the other
     bag, ticks = tmp_path / "run" / "bag", list(range(1, 122))
@@ -216,8 +217,7 @@ def test_a_run_records_the_sensors_and_the_states_alone_give_the_same_readings(
     }
     recorded = [found["/imu/pelvis_imu"][tick][-37 * 8 :] for tick in ticks]
     assert recorded == expected
-    replayed = processes.command("replay", "run")
-    assert replayed.wait(120.0) == 0, replayed.stderr
+    assert main(["replay", str(tmp_path / "run")]) == 0
 
 
 # What is lost, and what is not
@@ -280,7 +280,7 @@ def test_a_recorder_that_stands_still_holds_the_simulation_and_loses_nothing(
 ) -> None:
     recorder = processes.node(topics.RECORDER_NODE, directory="run")
     processes.controller("pendulum", wait_for_subscribers=2)
-    simulator = processes.simulator("pendulum", max_ticks=LONG, wait_for_subscribers=3)
+    simulator = processes.simulator("pendulum", max_ticks=ENOUGH, wait_for_subscribers=3)
     wait_until(lambda: watcher.tick > 300, "ticks", SLOW, watcher.look)
 
     recorder.send(signal.SIGSTOP)
@@ -293,7 +293,7 @@ def test_a_recorder_that_stands_still_holds_the_simulation_and_loses_nothing(
 
     assert held_at - stopped_at < MOST_UNACKNOWLEDGED
     assert simulator.wait() == recorder.wait() == 0
-    assert summary_of(tmp_path / "run")["ticks"] == LONG
+    assert summary_of(tmp_path / "run")["ticks"] == ENOUGH
     assert summary_of(tmp_path / "run")["lost_messages"] == {}
 
 

@@ -46,10 +46,10 @@ def started(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
 def runs(started: Processes, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A second of a pushed walk with simulated log times, also as SQLite, and with wall times."""
     directory, found = tmp_path_factory.mktemp("runs"), {}
-    for name, log_time in (("mcap", "simulated"), ("wall", "wall")):
+    for name, log_time, way in (("mcap", "simulated", ()), ("wall", "wall", ("--in-process",))):
         process = started.command(
             *("run", "--clip", "walk", "--duration", "1", "--push=chest:200,50,0@0.3"),
-            *("--log-time", log_time),
+            *("--log-time", log_time, *way),
             *("--output", str(directory / name)),
         )
         assert process.wait(120.0) == 0, process.stderr
@@ -153,7 +153,7 @@ def test_the_run_is_the_same_to_all_who_read_it(
     assert tables[0] == tables[1]
 
 
-@EACH_STORAGE
+@pytest.mark.parametrize("storage", ["mcap", pytest.param("sqlite3", marks=pytest.mark.nightly)])
 def test_players_in_the_place_of_either_node_get_the_same(
     runs: dict[str, Path], storage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

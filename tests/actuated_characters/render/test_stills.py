@@ -228,9 +228,13 @@ def test_render_writes_a_strip_into_the_runs_directory(
     np.testing.assert_array_equal(read, strip(recording, 2, start=0.05, ghost=True, size=SIZE))
 
 
-def test_a_real_run_is_drawn_and_can_be_run_again(processes: Processes, tmp_path: Path) -> None:
-    run = ("run", "--character", "lift", "--duration", "0.1", "--output", str(tmp_path / "run"))
-    assert processes.command(*run).wait() == 0
+@pytest.mark.slow
+def test_a_real_run_is_drawn_and_can_be_run_again(
+    processes: Processes, tmp_path: Path, own_handlers: None
+) -> None:
+    run = ("run", "--in-process", "--character", "lift", "--duration", "0.1")
+    run = (*run, "--output", str(tmp_path / "run"))
+    assert main([*run]) == 0
 
     render = processes.command("render", str(tmp_path / "run"), "--times", "0,0.05")
     assert render.wait() == 0
@@ -238,7 +242,7 @@ def test_a_real_run_is_drawn_and_can_be_run_again(processes: Processes, tmp_path
 
     picture = imread(tmp_path / "run" / "strip.png")
     assert picture.shape[0] > 400 and picture.shape[1] % 2 == GAP % 2  # two, with captions
-    assert processes.command(*run, "--overwrite").wait() == 0
+    assert main([*run, "--overwrite"]) == 0
     assert not (tmp_path / "run" / "strip.png").exists()
 
 
@@ -260,6 +264,7 @@ def test_render_writes_a_film_into_the_runs_directory(
     (run / "video.mp4").unlink()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
     run: Path, processes: Processes, tmp_path: Path, number: signal.Signals

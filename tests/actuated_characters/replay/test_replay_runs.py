@@ -2,7 +2,7 @@
 
 import json
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from std_msgs.msg import String
 
 from actuated_characters.bags.reader import RecordedMessage
 from actuated_characters.bags.recording import read_recording, read_recordings
+from actuated_characters.cli import main
 from actuated_characters.replay.replay import replay
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
@@ -26,26 +27,17 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 LOWEST, LARGEST = 0, 62  # bits
 
 
-def run(processes: Processes, directory: Path, *options: str) -> Path:
+def run(directory: Path, *options: str) -> Path:
     """A run by the command line."""
-    process = processes.command("run", *options, "--output", str(directory))
-    assert process.wait(120.0) == 0, process.stderr
+    assert main(["run", *options, "--output", str(directory)]) == 0
     return directory
 
 
 @pytest.fixture(scope="module")
-def started(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
-    del domain
-    started = Processes(tmp_path_factory.mktemp("processes"))
-    yield started
-    started.end()
-
-
-@pytest.fixture(scope="module")
-def walk(started: Processes, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A second of walking, with assistance."""
     directory = tmp_path_factory.mktemp("walk") / "run"
-    return run(started, directory, "--clip", "walk", "--duration", "1")
+    return run(directory, "--in-process", "--clip", "walk", "--duration", "1")
 
 
 def recorder(processes: Processes, **parameters: object) -> Process:
@@ -72,10 +64,10 @@ def test_a_walk_with_assistance_comes_again(walk: Path) -> None:
     assert read_recording(walk).contacts  # were compared, too
 
 
-def test_a_pushed_fall_comes_again(processes: Processes, tmp_path: Path) -> None:
+def test_a_pushed_fall_comes_again(tmp_path: Path, own_handlers: None) -> None:
     push, limp = "--push=chest:400,50,0@0.2", "controller_node.root_assistance:=false"
     options = ("--clip", "walk", "--duration", "1.5", push, "--set", limp)
-    directory = run(processes, tmp_path / "run", *options)
+    directory = run(tmp_path / "run", "--in-process", *options)
 
     recording = read_recording(directory)
     result = replay([recording])
@@ -167,9 +159,9 @@ def test_two_humanoids_in_one_world_come_again(processes: Processes, tmp_path: P
         replay([recordings[1]])
 
 
-def test_an_arm_in_real_time_comes_again(processes: Processes, tmp_path: Path) -> None:
+def test_an_arm_in_real_time_comes_again(tmp_path: Path, own_handlers: None) -> None:
     arm = ("--character", "franka_panda", "--reference", "sine", "--duration", "1")
-    directory = run(processes, tmp_path / "run", *arm, "--set", "sim_node.mode:=realtime")
+    directory = run(tmp_path / "run", *arm, "--set", "sim_node.mode:=realtime")
 
     result = replay(read_recordings(directory))
 

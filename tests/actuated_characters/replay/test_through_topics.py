@@ -36,7 +36,7 @@ from tests.support.recorded_nodes import (
     TICKS,
     record_eventful,
     record_foreign,
-    record_pair,
+    record_pair_in_process,
     record_realtime,
     recorded,
 )
@@ -60,8 +60,8 @@ def folder(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def walk(folder: Path) -> Path:
     """A walk with assistance, by the command `run`."""
-    options = ["--clip", "walk", "--duration", "0.5", "--output", str(folder / "walk")]
-    assert main(["run", *options]) == 0
+    options = ["--in-process", "--clip", "walk", "--duration", "0.5"]
+    assert main(["run", *options, "--output", str(folder / "walk")]) == 0
     return folder / "walk"
 
 
@@ -82,7 +82,7 @@ def realtime(folder: Path, context: Context) -> Path:
 
 @pytest.fixture(scope="module")
 def pair(folder: Path) -> Path:
-    return record_pair(folder)
+    return record_pair_in_process(folder)
 
 
 def by_commands(path: Path, **options: Any) -> Any:

@@ -72,11 +72,11 @@ def walk(together: Processes, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def unassisted(together: Processes, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unassisted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same without root assistance and without a bag."""
     directory = tmp_path_factory.mktemp("unassisted")
     switch = ("--set", "controller_node.root_assistance:=false")
-    Run(together, *WALK, *switch, "--no-record", "--output", str(directory)).finish()
+    assert main([*WALK, *switch, "--in-process", "--no-record", "--output", str(directory)]) == 0
     return directory
 
 
@@ -133,6 +133,7 @@ def test_in_one_process_without_ros_the_states_are_the_same_to_the_bit(
         assert in_process[figure] == over_topics[figure]
 
 
+@pytest.mark.nightly
 def test_with_every_core_kept_busy_the_states_are_the_same_to_the_bit(
     walk: Path, processes: Processes, tmp_path: Path
 ) -> None:

@@ -24,6 +24,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 SIDES = ("left", "right")
 RATE = 240
 DURATION = 12  # s: each falls, and gets up again
+TICKS = 2 * RATE  # with the first strike, and the first fall
 LONG = 120.0  # s that a run may take
 FALLEN, UP = 0.3, 0.75  # m, of a root: on the ground, on two legs
 FAST = ("--no-view", "--set", "sim_node.real_time_factor:=0.0")
@@ -35,6 +36,11 @@ def brawl() -> Brawl:
     return brawl_in_process(load_scene("brawl"), DURATION * RATE)
 
 
+@pytest.fixture(scope="module")
+def first_fall() -> Brawl:
+    return brawl_in_process(load_scene("brawl"), TICKS)
+
+
 def hash_of(directory: Path, ticks: int) -> str:
     summary = json.loads((directory / "summary.json").read_text())
     assert (summary["ticks"], summary["missing_ticks"]) == (ticks, 0)
@@ -42,29 +48,28 @@ def hash_of(directory: Path, ticks: int) -> str:
 
 
 def test_the_brawl_has_the_states_of_its_two_classes_and_replays(
-    processes: Processes, tmp_path: Path, brawl: Brawl
+    processes: Processes, tmp_path: Path, first_fall: Brawl
 ) -> None:
     """In another process, over topics, as fast as it goes: the same to the last bit."""
     run = tmp_path / "run"
     command = processes.command(
-        *("play", "--scene", "brawl", "--duration", str(DURATION), "--output", str(run)), *FAST
+        *("play", "--scene", "brawl", "--duration", "2", "--output", str(run)), *FAST
     )
 
     assert command.wait(LONG) == 0, command.stderr
     assert "left goes for right: root force at most 400.0 N" in command.stdout
     assert "all is recorded" in command.stdout
-    found = {name: hash_of(run / name, DURATION * RATE) for name in SIDES}
-    assert found == brawl.hashes
+    found = {name: hash_of(run / name, TICKS) for name in SIDES}
+    assert found == first_fall.hashes
     assert replay(read_recordings(run)).state_hashes == found
 
 
 def test_nodes_of_their_own_processes_have_the_same_states(
-    processes: Processes, tmp_path: Path
+    processes: Processes, tmp_path: Path, first_fall: Brawl
 ) -> None:
-    ticks = 2 * RATE  # with the first strike, and the first fall
     scene, run = load_scene("brawl"), tmp_path / "run"
     recorder = processes.node(topics.RECORDER_NODE, directory=str(run), characters=list(SIDES))
-    own = {"real_time_factor": 0.0, "wait_for_subscribers": 3, "max_ticks": ticks}
+    own = {"real_time_factor": 0.0, "wait_for_subscribers": 3, "max_ticks": TICKS}
     nodes = {
         name: {key.replace(".", "__"): value for key, value in given.items()}
         for name, given in scene.nodes.items()
@@ -78,14 +83,14 @@ def test_nodes_of_their_own_processes_have_the_same_states(
     recorder.send(signal.SIGINT)
     assert recorder.wait(LONG) == 0, recorder.stderr
 
-    found = {name: hash_of(run / name, ticks) for name in SIDES}
-    assert found == brawl_in_process(scene, ticks).hashes
+    found = {name: hash_of(run / name, TICKS) for name in SIDES}
+    assert found == first_fall.hashes
     # the bag in the simulator's place has the opponent's states, too
     commands = replay_states(
         run, character="left", progress=lambda done: None, tell=lambda line: None
     )
     assert commands.identical
-    assert commands.states == ticks + 1
+    assert commands.states == TICKS + 1
 
 
 def test_they_collide_fall_and_get_up_again(brawl: Brawl) -> None:

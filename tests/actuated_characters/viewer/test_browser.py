@@ -27,8 +27,7 @@ LEAST_PIXELS = 200  # of a character
 BODY = (0.3, 0.55, 0.25, 0.8)  # left, right, top, bottom as shares of the page: without the panel
 
 
-@pytest.fixture
-def walking(processes: Processes) -> Process:
+def start_walker(processes: Processes) -> Process:
     """A humanoid that walks as a clip has it, its root assisted, in real time."""
     walk = {"reference": "clip", "clip": "walk", "root_assistance": True}
     simulator = {"real_time_factor": 1.0, "commanded_joints": _joints()}
@@ -37,7 +36,7 @@ def walking(processes: Processes) -> Process:
 
 @pytest.fixture
 def standing(processes: Processes) -> Process:
-    """A humanoid that holds its rest pose, likewise."""
+    """A humanoid that holds its rest pose, its root assisted, in real time."""
     simulator = {"real_time_factor": 1.0, "commanded_joints": _joints()}
     return processes.composed(simulator, {"root_assistance": True}, character="humanoid")
 
@@ -104,66 +103,6 @@ def root_of(client: SimulatorClient) -> "np.ndarray[tuple[int], np.dtype[np.floa
     return np.array([state.position[names.index(f"root_{axis}")] for axis in "xyz"])
 
 
-def test_a_page_without_a_simulator_shows_the_ground_and_says_so(
-    viewer: Process, browser: Browser
-) -> None:
-    browser.open(address_of(viewer))
-
-    wait_until(
-        lambda: "no simulator" in browser.evaluate("document.body.innerText"), "the panel", SOON
-    )
-
-    assert not body_of(browser.pixels()).any()
-
-
-def test_the_page_shows_the_walker_in_the_middle_and_it_moves(
-    walking: Process, viewer: Process, browser: Browser
-) -> None:
-    x, y = until_seen(browser, viewer)
-
-    height, width = browser.pixels().shape[:2]
-    assert abs(x / width - 0.5) < 0.15  # the camera looks at it, and it stays there
-    assert abs(y / height - 0.5) < 0.25
-    first = body_of(browser.pixels())
-    wait_until(
-        lambda: (first ^ body_of(browser.pixels())).sum() > LEAST_PIXELS // 2,
-        "the walker moves",
-        SOON,
-    )
-    assert "humanoid" in browser.evaluate("document.body.innerText")
-    assert not browser.console
-    assert walking.exit_code is None
-
-
-def test_a_drag_to_the_right_pushes_to_the_right_and_is_over_when_it_is_let_go(
-    standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
-) -> None:
-    applied = client.listen(topics.APPLIED_WRENCH)
-    forward = np.array(LOOK_AT) - np.array(EYE)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    x, y = until_seen(browser, viewer)
-    client.spin_until(lambda: client.states.messages, "a state")
-    before = root_of(client)
-
-    browser.press(x, y)
-    for step in range(1, 11):
-        browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
-
-    client.spin_until(lambda: (root_of(client) - before) @ right > 0.02, "the root moves", SOON)
-    pushes = [message for message in applied.messages if message.wrench]
-    # their sum, to which those of a mouse that has hardly moved add nothing
-    forces = [np.array([w.force.x, w.force.y, w.force.z]) for m in pushes for w in m.wrench]
-    impulse = np.sum(forces, axis=0)
-    assert impulse @ right > 0.9 * np.linalg.norm(impulse)
-    assert len({name for message in pushes for name in message.joint_names}) == 1
-
-    browser.mouse("mouseReleased", x + 80, y)
-    client.spin_until(lambda: not applied.last.wrench, "no push any more")
-    client.spin_until(lambda: (root_of(client) - before) @ right < 0.015, "the root goes back")
-    assert standing.exit_code is None
-
-
 def test_a_click_with_shift_throws_a_ball_that_hits(
     standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
 ) -> None:
@@ -196,16 +135,60 @@ def test_a_click_with_shift_throws_a_ball_that_hits(
     assert standing.exit_code is None
 
 
-def test_pause_holds_the_tick_and_resume_lets_it_go_on(
-    walking: Process, viewer: Process, browser: Browser, client: SimulatorClient
+def text_of(browser: Browser) -> str:
+    return str(browser.evaluate("document.body.innerText"))
+
+
+def test_a_page_shows_the_ground_then_the_walker_and_its_controls_act(
+    processes: Processes, viewer: Process, browser: Browser, client: SimulatorClient
 ) -> None:
-    until_seen(browser, viewer)
+    browser.open(address_of(viewer))
+    wait_until(lambda: "no simulator" in text_of(browser), "the panel", SOON)
+    assert not body_of(browser.pixels()).any()
+
+    walking = start_walker(processes)
+
+    check_that_it_walks_in_the_middle(browser, viewer)
+    check_that_a_control_sets_the_controllers_parameter(browser, client)
+    check_that_pause_holds_the_tick_and_resume_lets_it_go_on(browser, client)
+    assert walking.exit_code is None
+
+
+def check_that_it_walks_in_the_middle(browser: Browser, viewer: Process) -> None:
+    x, y = until_seen(browser, viewer)
+
+    height, width = browser.pixels().shape[:2]
+    assert abs(x / width - 0.5) < 0.15  # the camera looks at it, and it stays there
+    assert abs(y / height - 0.5) < 0.25
+    first = body_of(browser.pixels())
+    wait_until(
+        lambda: (first ^ body_of(browser.pixels())).sum() > LEAST_PIXELS // 2,
+        "the walker moves",
+        SOON,
+    )
+    assert "humanoid" in text_of(browser)
+    assert not browser.console
+
+
+def check_that_a_control_sets_the_controllers_parameter(
+    browser: Browser, client: SimulatorClient
+) -> None:
+    wait_until(lambda: browser.click("Balance"), "the controller's parameters", SOON)
+
+    node = topics.CONTROLLER_NODE
+    client.spin_until(
+        lambda: client.get_parameters(node, ["balance.enabled"]) == [True], "balance", SOON
+    )
+    wait_until(lambda: "balance.enabled True: set" in text_of(browser), "that it is set", SOON)
+
+
+def check_that_pause_holds_the_tick_and_resume_lets_it_go_on(
+    browser: Browser, client: SimulatorClient
+) -> None:
     client.spin_until(lambda: client.states.messages, "a state")
 
     assert browser.click("Pause")
-    wait_until(
-        lambda: "sim_node: paused" in browser.evaluate("document.body.innerText"), "paused", SOON
-    )
+    wait_until(lambda: "sim_node: paused" in text_of(browser), "paused", SOON)
     report = client.reported(paused=True)
     tick = next(int(item.value) for item in report.values if item.key == "tick")
     client.spin_until(lambda: tick_of(client.states.last) >= tick, "the last state")
@@ -217,38 +200,43 @@ def test_pause_holds_the_tick_and_resume_lets_it_go_on(
     client.spin_until(lambda: tick_of(client.states.last) == tick + 1, "a step", SOON)
     assert browser.click("Resume")
     client.spin_until(lambda: tick_of(client.states.last) > tick + 10, "it goes on", SOON)
-    assert walking.exit_code is None
 
 
-def test_a_control_sets_the_controllers_parameter(
-    walking: Process, viewer: Process, browser: Browser, client: SimulatorClient
-) -> None:
-    until_seen(browser, viewer)
-
-    wait_until(lambda: browser.click("Balance"), "the controller's parameters", SOON)
-
-    node = topics.CONTROLLER_NODE
-    client.spin_until(
-        lambda: client.get_parameters(node, ["balance.enabled"]) == [True], "balance", SOON
-    )
-    wait_until(
-        lambda: "balance.enabled True: set" in browser.evaluate("document.body.innerText"),
-        "that it is set",
-        SOON,
-    )
-    assert walking.exit_code is None
+def drag(browser: Browser, x: float, y: float, steps: int) -> None:
+    """To the right, by 8 pixels a step."""
+    browser.press(x, y)
+    for step in range(1, steps + 1):
+        browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
 
 
-def test_a_browser_that_is_killed_in_the_middle_of_a_drag_leaves_no_push_behind(
+def test_a_drag_to_the_right_pushes_to_the_right_until_it_is_let_go_or_the_browser_is_killed(
     standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
 ) -> None:
     applied = client.listen(topics.APPLIED_WRENCH)
+    forward = np.array(LOOK_AT) - np.array(EYE)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
     x, y = until_seen(browser, viewer)
-    browser.press(x, y)
-    for step in range(1, 6):
-        browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
-    client.spin_until(lambda: applied.messages and applied.last.wrench, "a push", SOON)
+    client.spin_until(lambda: client.states.messages, "a state")
+    before = root_of(client)
 
+    drag(browser, x, y, steps=10)
+
+    client.spin_until(lambda: (root_of(client) - before) @ right > 0.02, "the root moves", SOON)
+    pushes = [message for message in applied.messages if message.wrench]
+    # their sum, to which those of a mouse that has hardly moved add nothing
+    forces = [np.array([w.force.x, w.force.y, w.force.z]) for m in pushes for w in m.wrench]
+    impulse = np.sum(forces, axis=0)
+    assert impulse @ right > 0.9 * np.linalg.norm(impulse)
+    assert len({name for message in pushes for name in message.joint_names}) == 1
+
+    browser.mouse("mouseReleased", x + 80, y)
+    client.spin_until(lambda: not applied.last.wrench, "no push any more")
+    client.spin_until(lambda: (root_of(client) - before) @ right < 0.015, "the root goes back")
+    assert standing.exit_code is None
+
+    drag(browser, x, y, steps=5)
+    client.spin_until(lambda: applied.last.wrench, "a push", SOON)
     browser.kill()
 
     client.spin_until(lambda: not applied.last.wrench, "no push any more", SOON)
@@ -263,27 +251,10 @@ def test_a_browser_that_is_killed_in_the_middle_of_a_drag_leaves_no_push_behind(
         other.close()
 
 
-def test_a_simulator_that_starts_again_is_shown_again(
-    processes: Processes, walking: Process, viewer: Process, browser: Browser
+def test_a_reload_brings_all_back_ten_pages_are_served_at_once_and_another_simulator_is_shown(
+    processes: Processes, viewer: Process, browser: Browser
 ) -> None:
-    until_seen(browser, viewer)
-    walking.end()
-    text = browser.evaluate("document.body.innerText")
-
-    processes.composed({"real_time_factor": 1.0}, character="pendulum")
-
-    def shows_the_other() -> bool:
-        shown = browser.evaluate("document.body.innerText")
-        return "pendulum" in shown and "humanoid" not in shown
-
-    assert "humanoid" in text
-    wait_until(shows_the_other, "the other character", SOON, lambda: time.sleep(0.1))
-    assert viewer.exit_code is None
-
-
-def test_a_reload_brings_everything_back_and_ten_pages_are_served_at_once(
-    walking: Process, viewer: Process, browser: Browser
-) -> None:
+    walking = start_walker(processes)
     until_seen(browser, viewer)
     port = int(address_of(viewer).rpartition(":")[2])
 
@@ -296,6 +267,17 @@ def test_a_reload_brings_everything_back_and_ten_pages_are_served_at_once(
             "pictures for all",
             SOON,
         )
-
     assert walking.exit_code is None
     assert "Traceback" not in viewer.stderr
+
+    walking.end()
+    text = text_of(browser)
+    processes.composed({"real_time_factor": 1.0}, character="pendulum")
+
+    def shows_the_other() -> bool:
+        shown = text_of(browser)
+        return "pendulum" in shown and "humanoid" not in shown
+
+    assert "humanoid" in text
+    wait_until(shows_the_other, "the other character", SOON, lambda: time.sleep(0.1))
+    assert viewer.exit_code is None

@@ -19,7 +19,7 @@ from actuated_characters.runs.plan import make_plan
 from msgs_config.messages import topics
 from tests.support.control_messages import CAMERA, CLICK, DRAG, mutations
 from tests.support.ros import Process, Processes, SimulatorClient, tick_of, wait_until
-from tests.support.runs import run_plan
+from tests.support.runs import run_plan_here
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
@@ -136,7 +136,7 @@ def test_the_live_viewer_lives(processes: Processes, client: SimulatorClient) ->
 
 
 def test_the_viewer_of_a_recording_lives(processes: Processes, tmp_path: Path) -> None:
-    run_plan(make_plan("pendulum", 0.5, {}, {}, {}), tmp_path / "run")
+    run_plan_here(make_plan("pendulum", 0.5, {}, {}, {}), tmp_path / "run")
     viewer = processes.command("view", str(tmp_path / "run"))
 
     attack(address_of(viewer), viewer.pid, lambda: viewer.stdout)
@@ -152,7 +152,7 @@ def test_a_viewer_that_is_ended_leaves_nothing(
     processes: Processes, tmp_path: Path, number: signal.Signals
 ) -> None:
     run = tmp_path / "run"
-    run_plan(make_plan("pendulum", 0.5, {}, {}, {}), run)
+    run_plan_here(make_plan("pendulum", 0.5, {}, {}, {}), run)
     before = sorted(run.rglob("*"))
     viewer = processes.command("view", str(run))
     url = address_of(viewer)

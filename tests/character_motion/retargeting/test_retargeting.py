@@ -96,7 +96,7 @@ def test_an_import_is_the_same_each_time(tmp_path: Path, target: TargetBody) -> 
     assert texts[0] == texts[1]
 
 
-@pytest.mark.parametrize("rate", [24.0, 240.0])
+@pytest.mark.parametrize("rate", [24.0, pytest.param(240.0, marks=pytest.mark.nightly)])
 def test_frames_come_at_the_file_s_own_rate(
     tmp_path: Path, target: TargetBody, rate: float
 ) -> None:

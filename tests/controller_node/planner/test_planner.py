@@ -166,6 +166,7 @@ def test_nothing_is_found_where_all_comes_to_nothing() -> None:
     assert found.cost == np.inf
 
 
+@pytest.mark.slow
 def test_a_costly_plan_is_sought_for_longer() -> None:
     def plan_with(rounds: int, tolerance: float) -> Outlook:
         controller = a_controller(**{"plan.rounds": rounds, "plan.tolerance": tolerance})
@@ -186,6 +187,7 @@ def test_a_costly_plan_is_sought_for_longer() -> None:
 # Bits
 
 
+@pytest.mark.slow
 def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
     def walked(**given: object) -> str:
         return states_of(0.2, plan__rounds=2, plan__tolerance=0.0, **given)
@@ -391,9 +393,10 @@ def test_runs_that_are_planned_have_contacts_that_keep_their_points(
 
 
 @pytest.mark.slow
-def test_a_walk_goes_on_by_its_joints_alone() -> None:
+@pytest.mark.parametrize("duration", [0.6, pytest.param(1.2667, marks=pytest.mark.nightly)])
+def test_a_walk_goes_on_by_its_joints_alone(duration: float) -> None:
     settings = {"planner": "predictive"}
-    plan = make_plan("humanoid", 1.2667, {"reference": "clip", "clip": "walk"}, {}, settings)
+    plan = make_plan("humanoid", duration, {"reference": "clip", "clip": "walk"}, {}, settings)
     layout = HUMANOID.layout
 
     distances, turns = [], []

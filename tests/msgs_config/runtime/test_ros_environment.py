@@ -76,7 +76,13 @@ def test_no_node_starts_in_a_domain_that_is_none(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [(), ("--composed",)], ids=["processes", "composed"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param((), id="processes"),
+        pytest.param(("--composed",), id="composed", marks=pytest.mark.nightly),
+    ],
+)
 def test_a_run_s_own_processes_find_each_other_though_discovery_is_off(
     options: tuple[str, ...], processes: Processes, tmp_path: Path
 ) -> None:

@@ -198,7 +198,7 @@ def test_a_bag_has_the_frames_where_their_type_is_installed(
     assert found["/tf_static"] == {"odom", "base_link", whole.links[0].name}
 
 
-@pytest.mark.parametrize("name", ["humanoid", "laikago"])
+@pytest.mark.parametrize("name", ["humanoid", pytest.param("laikago", marks=pytest.mark.slow)])
 def test_the_description_and_the_frames_alone_look_like_the_renderers_picture(
     simulator: Simulator, client: SimulatorClient, frames: Frames, name: str
 ) -> None:

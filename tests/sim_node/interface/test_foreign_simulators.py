@@ -102,6 +102,7 @@ def reported(client: ControllerClient, inbox: ReceivedMessages, **least: int) ->
 # The controller: episodes
 
 
+@pytest.mark.slow
 def test_no_stray_episode_moves_the_reference_or_stops_the_answers(
     processes: Processes, simulator: ControllerClient
 ) -> None:

@@ -13,7 +13,7 @@ from actuated_characters.runs.plan import make_plan
 from tests.actuated_characters.viewer.test_browser import SOON, address_of, body_of
 from tests.support.browser import Browser, Pixels, needs_chromium, one_browser
 from tests.support.ros import Process, Processes, wait_until
-from tests.support.runs import run_plan
+from tests.support.runs import run_plan_here
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
 
@@ -23,7 +23,8 @@ LEAST_PIXELS = 100
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("runs") / "walk"
-    run_plan(make_plan("humanoid", 1.0, {"reference": "clip", "clip": "walk"}, {}, {}), directory)
+    plan = make_plan("humanoid", 1.0, {"reference": "clip", "clip": "walk"}, {}, {})
+    run_plan_here(plan, directory)
     return directory
 
 
@@ -72,10 +73,21 @@ def open_folder(browser: Browser, label: str) -> None:
     }})()""")
 
 
-def test_it_plays_stops_and_steps(viewer: Process, browser: Browser) -> None:
+def test_a_run_plays_is_saved_and_is_forked(viewer: Process, browser: Browser, walk: Path) -> None:
     before = load(browser, viewer)
     assert "state 0 of 240" in text_of(browser)
 
+    check_that_what_is_seen_is_saved_as_a_picture_and_as_a_film(browser, walk)
+    check_that_it_plays_stops_and_steps(browser, before)
+    check_that_a_fork_from_here_becomes_the_ghost(browser, walk)
+
+    viewer.send(signal.SIGINT)
+    assert viewer.wait() == 130
+
+
+def check_that_it_plays_stops_and_steps(browser: Browser, before: Pixels) -> None:
+    browser.click("Start")
+    wait_until(lambda: "state 0 of 240" in text_of(browser), "the start", SOON)
     browser.click("+1")
     wait_until(lambda: "0.004 s, state 1 of 240" in text_of(browser), "the next state", SOON)
     browser.click("Play")
@@ -89,14 +101,10 @@ def test_it_plays_stops_and_steps(viewer: Process, browser: Browser) -> None:
     browser.click("Start")
     wait_until(lambda: "state 0 of 240" in text_of(browser), "the start", SOON)
 
-    viewer.send(signal.SIGINT)
-    assert viewer.wait() == 130
 
-
-def test_what_is_seen_is_saved_as_a_picture_and_as_a_film(
-    viewer: Process, browser: Browser, walk: Path
+def check_that_what_is_seen_is_saved_as_a_picture_and_as_a_film(
+    browser: Browser, walk: Path
 ) -> None:
-    load(browser, viewer)
     open_folder(browser, "Export")
     wait_until(lambda: browser.click("PNG"), "the button", SOON)
     picture = walk / "view-0.000s.png"
@@ -121,8 +129,7 @@ def test_what_is_seen_is_saved_as_a_picture_and_as_a_film(
     assert (body_of(frames[0]) ^ body_of(frames[-1])).any()
 
 
-def test_a_fork_from_here_becomes_the_ghost(viewer: Process, browser: Browser, walk: Path) -> None:
-    load(browser, viewer)
+def check_that_a_fork_from_here_becomes_the_ghost(browser: Browser, walk: Path) -> None:
     browser.click("+1")
     open_folder(browser, "Fork")
     fork = walk.with_name("walk-fork")

@@ -9,7 +9,6 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 
 import pytest
 
@@ -126,11 +125,19 @@ def hostile() -> Iterator[ThreadingHTTPServer]:
     server.server_close()
 
 
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
+@pytest.fixture(scope="module")
+def shared_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     rules = f"--host-resolver-rules=MAP {HOST} 127.0.0.1"
-    with one_browser(tmp_path, rules) as browser:
+    with one_browser(tmp_path_factory.mktemp("browser"), rules) as browser:
         yield browser
+
+
+@pytest.fixture
+def browser(shared_browser: Browser) -> Browser:
+    """A browser that shows nothing."""
+    shared_browser.open("about:blank")
+    shared_browser.console.clear()
+    return shared_browser
 
 
 def text_of(browser: Browser) -> str:
