@@ -9,7 +9,7 @@ from msgs_config.runtime.process import limit_threads, middleware_settings
 limit_threads()
 
 from msgs_config.errors import ConfigurationError  # noqa: E402 - after the limit on threads
-from msgs_config.extras import require_extra  # noqa: E402
+from msgs_config.runtime.extras import require_extra  # noqa: E402
 
 try:
     for extra in ("plan", "view"):

@@ -18,7 +18,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a while to import
     from actuated_characters.scenes.scene import Scene

@@ -33,7 +33,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan

@@ -15,7 +15,7 @@ from actuated_characters.commands.common.settings import (
 )
 from actuated_characters.viewer.parameters import ViewerSettings
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 _MODULE = "actuated_characters.viewer.main"

@@ -3,7 +3,7 @@
 Raises ConfigurationError, with how to get it, where the extra is not installed.
 """
 
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 require_extra("gymnasium", "actuated_characters.environments")
 

@@ -28,9 +28,9 @@ from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from actuated_characters.render.stills import LONGEST_ARROW, Progress, check_size
 from actuated_characters.render.video import check_video, write_video
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.geometry import rotations
-from msgs_config.nearest_rows import nearest_rows
 
 MOVIE_SIZE = (960, 540)
 

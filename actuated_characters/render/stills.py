@@ -24,8 +24,8 @@ from actuated_characters.render.engine.renderer import FrameSpec, Picture
 from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
+from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import ConfigurationError, RecordingError
-from msgs_config.nearest_rows import nearest_rows
 from msgs_config.whole_files import write_whole
 from sim_node.physics.settings import WorldSettings
 

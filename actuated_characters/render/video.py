@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
 from msgs_config.errors import ConfigurationError, RecordingError
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 from msgs_config.whole_files import replacing
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from actuated_characters.recorder.run_directory import LOGS, PARAMETERS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 MODULES = {
     "sim_node": "sim_node.main",

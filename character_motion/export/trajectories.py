@@ -10,9 +10,9 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
+from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
-from msgs_config.nearest_rows import nearest_rows
 
 _MOST_FRAMES = 100_000
 _STEP_ROUNDING = 1e-6  # share of a step, so that the last frame is not lost to rounding

@@ -20,8 +20,8 @@ from controller_node.references.files.reconstructed import ReconstructedClip
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import hint, require_extra
 from msgs_config.parameters import Values
+from msgs_config.runtime.extras import hint, require_extra
 from msgs_config.shared_parameters import COMMAND_DELAY
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table, show
 from lecture.framework.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import require_extra
+from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from lecture.framework.study import Study

@@ -15,9 +15,9 @@ from types import FrameType
 from typing import NoReturn, Protocol
 
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
-from msgs_config.extras import require_extra
 from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.runtime.exit_watchdog import exit_after
+from msgs_config.runtime.extras import require_extra
 from msgs_config.runtime.ros_environment import (
     DISCOVERY_RANGE,
     LOCALHOST,

@@ -10,8 +10,8 @@ from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
-from msgs_config.extras import require_extra
 from msgs_config.geometry.surface import Surface
+from msgs_config.runtime.extras import require_extra
 
 _CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 _SIDES = np.array(  # corners of each side, counterclockwise from outside

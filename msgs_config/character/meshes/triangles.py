@@ -17,8 +17,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.meshes.check import check_mesh, is_stl_of_text
 from msgs_config.errors import CharacterError
-from msgs_config.extras import require_extra
 from msgs_config.geometry import fixed_order
+from msgs_config.runtime.extras import require_extra
 
 _MAX_TRIANGLES = 2_000_000
 _MAX_NODES = 20_000  # of a COLLADA file, whose nodes may repeat each other

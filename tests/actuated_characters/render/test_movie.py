@@ -25,9 +25,9 @@ from actuated_characters.render.movie import (
 from actuated_characters.render.scene import make_scene
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character, Placement, UrdfOptions
+from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import CharacterError, ConfigurationError, RecordingError, RunError
 from msgs_config.messages.wrenches import WrenchArrays
-from msgs_config.nearest_rows import nearest_rows
 from tests.support.physics import DATA, character
 
 pytestmark = pytest.mark.slow

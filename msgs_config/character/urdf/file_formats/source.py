@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 from msgs_config import files
 from msgs_config.character.urdf.file_formats.formats import CHARACTER_FILE, URDF_SUFFIXES
 from msgs_config.errors import CharacterError
-from msgs_config.extras import require_extra
 from msgs_config.file_kinds import refuse_other_kind
+from msgs_config.runtime.extras import require_extra
 from msgs_config.runtime.fork_safe import fork_safe_lock
 
 XACRO = ".xacro"

@@ -10,9 +10,9 @@ import pytest
 
 from actuated_characters.cli import main
 from msgs_config.errors import ConfigurationError
-from msgs_config.extras import PACKAGES, hint, require_extra
+from msgs_config.runtime.extras import PACKAGES, hint, require_extra
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 WALK = ("run", "--clip", "walk", "--duration", "0.1", "--output", "results")
 NEEDS = [  # package, extra, arguments
     ("viser", "view", ("run", "--character", "pendulum", "--view", "--output", "results")),
