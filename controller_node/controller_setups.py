@@ -15,15 +15,6 @@ from msgs_config.memory import MemoryFormat
 from msgs_config.messages.state import StampedState
 from msgs_config.parameters import Parameter, Value, Values
 
-_PACKAGES = (
-    *("controller_node.balance", "controller_node.behaviours", "controller_node.control_laws"),
-    *("controller_node.controller", "controller_node.controller_settings"),
-    *("controller_node.effort_series", "controller_node.planner", "controller_node.references"),
-    *("controller_node.strength", "controller_node.tracked_reference"),
-    *("msgs_config.character", "msgs_config.geometry", "msgs_config.messages"),
-)
-"""Of what a controller consists, and its keyframes."""
-
 
 @dataclass
 class ControllerSetup:
@@ -54,7 +45,7 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
         drives_root=ROOT in joints,
         driven=np.flatnonzero(character.layout.mask(joints)),
         warnings=motion.warnings,
-        keyframe_format=MemoryFormat(_PACKAGES, *controller.parts),
+        keyframe_format=MemoryFormat(*controller.parts),
     )
 
 

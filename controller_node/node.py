@@ -228,7 +228,8 @@ class ControllerNode(ComposableNode):
     ) -> None:
         setup, session = self._setups.in_force, self._simulators.bound or ANONYMOUS
         write = partial(setup.keyframe_format.write, setup.controller)
-        publish_together(self._keyframes.messages(state.stamp_ns, session, write))
+        if not self._simulators.runs_on:  # there it would come late, and nobody forks that
+            publish_together(self._keyframes.messages(state.stamp_ns, session, write))
         started = time.perf_counter()
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)

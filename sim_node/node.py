@@ -62,7 +62,7 @@ class SimNode(ComposableNode):
         """The session of all messages of this simulator."""
         self._once_logger = OnceLogger(self.node.get_logger())
         self._keyframes = SimulatorKeyframes(
-            self.node, self._simulation, loaded.values, self.session
+            self.node, self._simulation, loaded.values, self.session, self._once_logger
         )
         self._open_topics()
         self._watchdog = Watchdog(self._settings.republish_period, self._settings.lockstep_timeout)

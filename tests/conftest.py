@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,6 +19,10 @@ from tests.support.ros import DDS_PROFILES, RANGE, ControllerClient, Processes, 
 os.environ[DDS_PROFILES] = str(
     Path(__file__).parents[1] / "msgs_config/runtime/fastdds_localhost.xml"
 )
+
+# The key that seals keyframes is one of the tests alone, also where there is no home.
+STATE_HOME = tempfile.TemporaryDirectory(prefix="actuated-characters-tests-")
+os.environ["XDG_STATE_HOME"] = STATE_HOME.name
 
 # On a machine that is busy with other things an example takes as long as it takes.
 settings.register_profile("any load", deadline=None)

@@ -45,6 +45,7 @@ def collect(
     begins, first_ns, latched = Beginnings(), 0, list[str]()
     if begin is not None:
         begins.first_ns = begin.stamp_ns
+        begins.keyframes.add(begin.stamp_ns)  # it may come behind its state
         first_ns = begin.log_time_ns - _EARLIER_NS
         latched = [name for name in read_topics(bag) if name.endswith(_LATCHED)]
     # by topic: the timeline of its namespace, and the topic's name in that

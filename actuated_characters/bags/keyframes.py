@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from actuated_characters.bags.reader import read_messages, read_topics
+from msgs_config.memory import is_own
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode_header
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.joint_state import JointStateDecoder
+from msgs_config.messages.keyframe import decode_keyframe
 
 _ROUNDING_NS = 1000  # by which a time that was computed may be too small
 _SIMULATOR = topics.KEYFRAME.of(topics.SIM_NODE).name
@@ -38,7 +40,7 @@ class KeyframePlaces:
 
 
 def find_keyframes(bag: Path) -> KeyframePlaces | None:
-    """The keyframes of a bag; None if it has none, or those of several nodes of a kind.
+    """The keyframes of a bag that can be opened; None if it has those of several nodes of a kind.
 
     Raises:
         ActuatedCharactersError: the bag cannot be read.
@@ -51,12 +53,18 @@ def find_keyframes(bag: Path) -> KeyframePlaces | None:
     at: dict[int, int] = {}
     answered: set[int] = set()
     for message in read_messages(bag, (simulators[0], controllers[0])):
-        stamp_ns, _ = decode_header(message.raw)
+        stamp_ns, _, memory = decode_keyframe(message.raw)
+        if not is_own(memory):
+            continue
         if message.topic == simulators[0]:
             at.setdefault(stamp_ns, message.log_time_ns)
         else:
             answered.add(stamp_ns)
-    first_ns = _first_stamp(bag, simulators[0].removesuffix(_SIMULATOR), at)
+    namespace = simulators[0].removesuffix(_SIMULATOR)
+    needed = (namespace + each.name for each in (topics.JOINT_STATES, topics.EPISODE))
+    if not {*needed} <= recorded.keys():  # a character with a name has them below that
+        return None
+    first_ns = _first_stamp(bag, namespace, at)
     if first_ns is None:
         return None
     places = (KeyframePlace(stamp, at[stamp]) for stamp in sorted(at.keys() & answered))

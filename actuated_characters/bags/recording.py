@@ -257,7 +257,7 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
     ends, plans = stamp_list[1:], timeline.plans
     simulator = timeline.simulator.parameters
     is_amid = bool(states.effort) and not np.isnan(states.effort[:size]).all()
-    keyframe = world.keyframes.get(stamp_list[0]) if is_amid else None
+    keyframe = world.keyframes.get(stamp_list[0])
     reference_position, reference_velocity = _references(stamps, timeline.references, size)
     return Recording(
         character=rebuilt.character,
@@ -285,7 +285,7 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         balls=_at(stamp_list, world.balls, None),
         throws_sent=world.throws_sent,
         skipped_states=timeline.skipped_states,
-        begins_amid=timeline.begins_amid and keyframe is None,
+        begins_amid=(timeline.begins_amid or is_amid) and keyframe is None,
         keyframe=keyframe,
         controller_keyframe=timeline.keyframes.get(stamp_list[0]) if keyframe else None,
         world=rebuilt.world,

@@ -14,11 +14,13 @@ from actuated_characters.bags.plans import PlanArrays, decode_plan
 from actuated_characters.bags.rebuilding import Rebuilt
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
+from msgs_config.memory import is_own
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import decode_header, decode_string
+from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
+from msgs_config.messages.keyframe import decode_keyframe
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.throw import ProjectileThrow
@@ -108,9 +110,10 @@ class WorldTimeline:
         if name == topics.THROW.name:
             self.throws_sent += 1
         elif name == _KEYFRAME:
-            stamp_ns, _ = decode_header(raw)
-            self.keyframes[stamp_ns] = raw
-            self._begins.keyframes.add(stamp_ns)
+            keyframe = decode_keyframe(raw)
+            if is_own(keyframe.memory):
+                self.keyframes[keyframe.stamp_ns] = raw
+                self._begins.keyframes.add(keyframe.stamp_ns)
         elif name == topics.THROWN.name:
             balls = decode_balls(raw)
             self.balls[balls.stamp_ns] = balls
@@ -300,8 +303,11 @@ class CharacterTimeline:
             self.controller.append(NodeParameters(parameters, since_ns))
 
     def _take_keyframe(self, raw: bytes, published_ns: int) -> None:
-        stamp_ns, _ = decode_header(raw)
-        self.keyframes[stamp_ns] = raw
+        if self.states.stamps_ns[1:2]:  # that of the first state is there; no other is needed
+            return
+        keyframe = decode_keyframe(raw)
+        if is_own(keyframe.memory):
+            self.keyframes[keyframe.stamp_ns] = raw
 
     def _take_plan(self, raw: bytes, published_ns: int) -> None:
         with suppress(MessageError):  # raised for a plan of another controller

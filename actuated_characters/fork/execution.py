@@ -86,8 +86,10 @@ def _is_unchanged(recording: Recording) -> bool:
 
 def describe_new_hits(fork: ForkPlan, directory: Path) -> Sequence[str]:
     """Of each new throw a few words on whether it hit; none where other balls may be there."""
-    if not fork.throws or fork.resets or fork.skipped:
+    balls = fork.recording.balls[0] if fork.recording.balls else None
+    if fork.resets or (balls is not None and balls.names):
         return ()
     throws = [*fork.repeated_throws, *fork.throws]
-    words = describe_hits(fork.plan, throws, read_states(directory))
+    since = fork.skipped / fork.plan.simulation.rate_hz
+    words = describe_hits(fork.plan, throws, read_states(directory), since)
     return words[len(fork.repeated_throws) :]

@@ -19,7 +19,7 @@ from actuated_characters.recorder.forked_from import ForkedFrom
 from actuated_characters.recorder.run_directory import read_metrics
 from actuated_characters.replay.comparison import clock_of, first_tick_of
 from actuated_characters.replay.players.controller_parameters import first_parameters
-from actuated_characters.replay.world import simulator_values
+from actuated_characters.replay.world import check_keyframe, simulator_values
 from actuated_characters.runs.plan import RunPlan, count_ticks
 from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws
@@ -163,12 +163,13 @@ def _read_past(path: Path, at: float | None) -> _Past:
     Raises:
         RecordingError: the nodes cannot repeat it exactly.
     """
-    keyframes = find_keyframes(find_bag(path))
+    keyframes = None if at is None else find_keyframes(find_bag(path))
     begin = None if keyframes is None or at is None else keyframes.before(at)
     recordings = read_recordings(path, begin)
     if begin is not None and recordings[0].versions != installed_versions():
         begin, recordings = None, read_recordings(path)
     recording = _repeatable(path, recordings)
+    check_keyframe(recording)
     skipped = 0
     if begin is not None and keyframes is not None:
         clock = clock_of(recording)

@@ -122,7 +122,9 @@ class _Check:
 
     def _unknown_ticks(self, first: int) -> int:
         """The ticks from a row on in which commands act that are not in the recording."""
-        return self._delay if not first and self._recording.keyframe is not None else 0
+        if first or self._recording.keyframe is None:
+            return 0
+        return self._delay + (self._on_timeout == "hold")
 
     def _episodes(self) -> Iterator[tuple[int, int]]:
         """The first tick of each episode and the one after its last, which may be a reset."""
@@ -217,7 +219,7 @@ class _Check:
             sent = deque(self._sent(first, end))
             known = [{0} for _ in range(self._layout.size)]  # bits that an entry can have; 0 is 0.0
             if not first and self._recording.keyframe is not None:  # one may be held from before
-                held = self._recording.effort[: self._delay + 1].view(np.int64)
+                held = self._recording.effort[: self._delay + 1 + later].view(np.int64)
                 known = [{0, *bits} for bits in held.T.tolist()]
             for row in range(first, end):
                 answered = row - self._delay

@@ -28,7 +28,7 @@ from actuated_characters.replay.players.simulator_inputs import make_inputs
 from actuated_characters.replay.players.simulator_outputs import opponent_of
 from actuated_characters.replay.world import read_world, simulator_values
 from actuated_characters.runs.processes import Child, Children
-from msgs_config.errors import ConfigurationError, RunError
+from msgs_config.errors import ConfigurationError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, COLLISION, KEYFRAME, PLACEMENT
@@ -119,6 +119,11 @@ def _simulator_parameters(
         parameters[prefix + CHARACTER.name] = str(file)
         parameters |= {prefix + name: values[name] for name in _OF_A_CHARACTER}
     if are_applied:
+        if together[0].keyframe is not None and first["command_delay_ticks"]:
+            raise RecordingError(
+                "the recording begins with a keyframe, in which late commands are on their way, "
+                "and not every tick has its commands: replay it without --through-topics"
+            )
         parameters["command_delay_ticks"] = 0
     parameters[KEYFRAME.name] = write_keyframe(directory, topics.SIM_NODE, together[0].keyframe)
     return parameters | {
@@ -172,6 +177,10 @@ def replay_states(
     for name in _NOT_TO_BE_SET:
         if name in settings:
             raise ConfigurationError(f"parameter '{name}' is set by the recording")
+    if start and recording.keyframe is not None and recording.controller_keyframe is None:
+        raise RecordingError(
+            "the recording begins with a keyframe of the simulator, and has none of the controller"
+        )
     if settings and recording.controller_keyframe is not None:
         raise ConfigurationError(
             "the recording begins with a keyframe, in which its controller has the parameters of "

@@ -38,7 +38,7 @@ def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
     if any(recording.begins_amid for recording in recordings):
         raise RecordingError(
             "the recording begins in the middle of an episode, and has neither another one nor a "
-            "keyframe: it can be viewed, not repeated"
+            "keyframe of this user's: it can be viewed, not repeated"
         )
     found: dict[tuple[str, ...], list[Recording]] = {}
     for recording in recordings:
@@ -55,6 +55,13 @@ def worlds(recordings: Sequence[Recording]) -> list[tuple[Recording, ...]]:
                 f"{', '.join(sorted(recorded))} was; record all of them"
             )
     return [tuple(together) for together in found.values()]
+
+
+def check_keyframe(recording: Recording) -> None:
+    """Raise RecordingError if a recording begins with a keyframe of other versions than these."""
+    changes = describe_changes(recording.versions, installed_versions())
+    if recording.keyframe is not None and changes:
+        raise RecordingError(f"the recording begins with a keyframe, and was {changes}")
 
 
 def simulator_values(recording: Recording, row: int = 0) -> Values:
@@ -167,6 +174,7 @@ def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simul
     first_tick = TickClock(settings.rate_hz).tick(first_stamp_ns)
     simulation = Simulation(setups, settings, first_tick)
     if together[0].keyframe is not None:
+        check_keyframe(together[0])
         memory = decode_keyframe(together[0].keyframe).memory
         simulation.load_snapshot(_of_applied(read_memory(memory, simulation)[0], settings))
     return simulation

@@ -29,6 +29,7 @@ class KeyframePublisher:
         self._publisher = node.publisher(topic)
         self._clock, self._period_s, self._at_once = clock, period_s, at_once
         self._ticks = max(round(period_s * clock.rate_hz), 1)
+        self._every = 1  # periods from one keyframe to the next, by the size of the last
 
     def messages(
         self, stamp_ns: int, session: str, write: Callable[[], bytes]
@@ -37,11 +38,11 @@ class KeyframePublisher:
         if not self._period_s:
             return
         period, remainder = divmod(self._clock.tick(stamp_ns) - FIRST_TICK, self._ticks)
-        is_due = self._at_once or (period and not remainder)
+        is_due = self._at_once or (period and not remainder and not period % self._every)
         if not is_due or not has_subscribers(self._publisher):
             return
         raw = encode_keyframe(Keyframe(stamp_ns, session, write()))
-        periods = math.ceil(len(raw) / (self._period_s * _BYTES_PER_SECOND))
-        if self._at_once or period % periods == 0:
+        self._every = math.ceil(len(raw) / (self._period_s * _BYTES_PER_SECOND))
+        if self._at_once or period % self._every == 0:
             self._at_once = False
             yield self._publisher, raw

@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from msgs_config.errors import MessageError, RecordingError
-from msgs_config.memory import pack, unpack
 from msgs_config.messages import typed
 from msgs_config.messages.session import read_session
 
 TYPE_NAME = "sensor_msgs/msg/CompressedImage"
-_FORMAT = "keyframe of a node, zlib"
+_FORMAT = "keyframe of a node"
 
 
 class Keyframe(NamedTuple):
@@ -23,13 +22,13 @@ class Keyframe(NamedTuple):
 
     stamp_ns: int
     session: str
-    memory: bytes
+    memory: bytes  # as `MemoryFormat` writes it
 
 
 def encode_keyframe(keyframe: Keyframe) -> bytes:
     """The serialised message."""
     message = typed.stamped(TYPE_NAME, keyframe.stamp_ns, keyframe.session, format=_FORMAT)
-    message.data = np.frombuffer(pack(keyframe.memory), np.uint8)
+    message.data = np.frombuffer(keyframe.memory, np.uint8)
     return typed.encode(message)
 
 
@@ -38,13 +37,12 @@ def decode_keyframe(raw: bytes) -> Keyframe:
 
     Raises:
         MessageError: it is no keyframe.
-        RecordingError: it is damaged.
     """
     message = typed.decode(raw, TYPE_NAME)
     if message.format != _FORMAT:
         raise MessageError(f"a picture of format {message.format!r:.60}, no keyframe")
     session = read_session(message.header.frame_id)
-    return Keyframe(typed.stamp_of(message), session, unpack(message.data.tobytes()))
+    return Keyframe(typed.stamp_of(message), session, message.data.tobytes())
 
 
 def read_keyframe(path: str) -> Keyframe:

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 from msgs_config.bus.keyframe_publisher import KeyframePublisher
 from msgs_config.bus.node import BusNode
+from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.publishing import Outgoing
-from msgs_config.errors import RecordingError
+from msgs_config.errors import RecordingError, SimulationError
 from msgs_config.memory import MemoryFormat
 from msgs_config.messages import topics
 from msgs_config.messages.keyframe import read_keyframe
@@ -13,41 +14,46 @@ from msgs_config.parameters import Values
 from msgs_config.shared_parameters import KeyframeSettings
 from sim_node.physics.simulation import Simulation, Snapshot
 
-_PACKAGES = ("sim_node.physics", "msgs_config.character", "msgs_config.messages")
-
 
 def keyframe_format(simulation: Simulation) -> MemoryFormat:
     """The form of the keyframes of a simulation that was just made."""
-    return MemoryFormat(_PACKAGES, simulation.settings)
+    return MemoryFormat(simulation.settings)
 
 
 def read_memory(memory: bytes, simulation: Simulation) -> tuple[Snapshot, int]:
     """The state in a keyframe of a simulation like this one, and the stamp of its episode's first.
 
     Raises:
-        RecordingError: the keyframe is of another simulation.
+        RecordingError: the keyframe is of another simulation, or is not opened.
     """
+    found = keyframe_format(simulation).read(memory)
     try:
-        snapshot, episode_ns = keyframe_format(simulation).read(memory)
+        snapshot, episode_ns = found
         sizes = [len(each.state.position) for each in snapshot.characters]
-        is_one = isinstance(snapshot, Snapshot) and isinstance(episode_ns, int)
-        if is_one and sizes == [each.layout.size for each in simulation.characters]:
-            return snapshot, episode_ns
-    except (TypeError, AttributeError, ValueError) as error:  # whatever a stranger wrote
+    except (TypeError, ValueError, AttributeError) as error:
         raise RecordingError("a keyframe cannot be used: it is none of a simulator") from error
-    raise RecordingError("a keyframe cannot be used: it is of other characters")
+    if sizes != [each.layout.size for each in simulation.characters]:
+        raise RecordingError("a keyframe cannot be used: it is of other characters")
+    return snapshot, episode_ns
 
 
 class SimulatorKeyframes:
     """Publishes keyframes of a simulation, and lets it go on from one that is given."""
 
-    def __init__(self, node: BusNode, simulation: Simulation, values: Values, session: str) -> None:
+    def __init__(
+        self,
+        node: BusNode,
+        simulation: Simulation,
+        values: Values,
+        session: str,
+        logger: OnceLogger,
+    ) -> None:
         """Offer the topic, and read the keyframe that the parameters' values name.
 
         Raises:
             ActuatedCharactersError: there is no keyframe in that file.
         """
-        self._simulation, self._session = simulation, session
+        self._simulation, self._session, self._logger = simulation, session, logger
         self._format = keyframe_format(simulation)
         settings = KeyframeSettings.of(values)
         self._given = read_keyframe(settings.file) if settings.file else None
@@ -76,10 +82,13 @@ class SimulatorKeyframes:
 
         While a push acts there is none: it was not recorded for how long it goes on.
         """
-        simulation = self._simulation
+        simulation, session = self._simulation, self._session
         pushes = (push for each in simulation.characters for push in each.pushes)
         if not any(push.acts_at(simulation.tick) for push in pushes):
-            yield from self._publisher.messages(simulation.stamp_ns, self._session, self._memory)
+            try:
+                yield from self._publisher.messages(simulation.stamp_ns, session, self._memory)
+            except SimulationError as error:  # the run goes on without
+                self._logger.log_once(f"no keyframe: {error}")
 
     def _memory(self) -> bytes:
         return self._format.write((self._simulation.snapshot(), self.episode_ns))

@@ -11,6 +11,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray
 from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.model import Character
+from msgs_config.errors import SimulationError
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.balls.projectiles import Projectiles
@@ -146,11 +147,18 @@ class World:
         return heights
 
     def to_bytes(self) -> bytes:
-        """The whole state, for any world of equal settings, characters and balls."""
-        with tempfile.TemporaryDirectory() as directory:
-            file = Path(directory) / _STATE_FILE
-            pybullet.saveBullet(str(file), physicsClientId=self._client)
-            return file.read_bytes()
+        """The whole state, for any world of equal settings, characters and balls.
+
+        Raises:
+            SimulationError: there is no place for temporary files, by which the engine saves it.
+        """
+        try:
+            with tempfile.TemporaryDirectory() as directory:
+                file = Path(directory) / _STATE_FILE
+                pybullet.saveBullet(str(file), physicsClientId=self._client)
+                return file.read_bytes()
+        except (OSError, pybullet.error) as error:
+            raise SimulationError(f"the engine's state cannot be saved: {error}") from error
 
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""

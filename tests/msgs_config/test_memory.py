@@ -1,17 +1,18 @@
-"""The memory of an object goes on in an equal one, and bytes of a stranger run nothing of his."""
+"""The memory of an object goes on in an equal one; what another user wrote is not opened."""
 
-import functools
-import operator
 import os
 import pickle
+import stat
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from msgs_config import memory as module
 from msgs_config.errors import MessageError, RecordingError
-from msgs_config.memory import MemoryFormat, pack, unpack
+from msgs_config.memory import MemoryFormat, is_own
 from msgs_config.messages import typed
 from msgs_config.messages.keyframe import (
     TYPE_NAME,
@@ -24,87 +25,87 @@ from msgs_config.messages.session import make_session
 from msgs_config.messages.state import StampedState
 from tests.support.physics import character
 
-PACKAGES = ("msgs_config.character", "msgs_config.messages")
 
-
-class Calls:
-    """Is pickled as a call."""
-
-    def __init__(self, function: object, *arguments: object) -> None:
-        self.call = function, arguments
+class Hostile:
+    """Is unpickled by a call."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        return self.call
+        return os.mkdir, ("it-was-opened",)
+
+
+def sealed(raw: bytes) -> bytes:
+    """Bytes as this user's programs write them."""
+    packed = zlib.compress(raw)
+    return module._seal_of(packed) + packed
 
 
 def test_parts_are_those_of_the_reader_and_all_else_is_the_writers() -> None:
     theirs, ours = character("pendulum"), character("pendulum")
     state = StampedState(5, np.array([0.1]), np.array([-0.0]), None)
-    memory = MemoryFormat(PACKAGES, theirs).write({"of": theirs, "state": state, "same": state})
-    found = MemoryFormat(PACKAGES, ours).read(memory)
+    memory = MemoryFormat(theirs).write(
+        {"of": theirs, "state": state, "same": state, "limits": theirs.effort_limits}
+    )
+    found = MemoryFormat(ours).read(memory)
     assert found["of"] is ours
+    assert found["limits"].__self__ is ours
     assert found["state"] is found["same"]
     assert found["state"].velocity.tobytes() == state.velocity.tobytes()
     assert len(memory) < 1000 < len(pickle.dumps(theirs))
 
 
-def test_methods_are_written_by_their_names() -> None:
-    made = character("pendulum")
-    found = MemoryFormat(PACKAGES, made).read(
-        MemoryFormat(PACKAGES, made).write(made.effort_limits)
-    )
-    assert found.__self__ is made
-    assert found().tolist() == made.effort_limits().tolist()
+def test_a_memory_of_other_parts_is_refused() -> None:
+    memory = MemoryFormat(character("pendulum")).write("anything")
+    with pytest.raises(RecordingError, match="other parameters or files"):
+        MemoryFormat(character("humanoid")).read(memory)
 
 
 @pytest.mark.parametrize(
-    "hostile",
+    "change",
     [
-        Calls(os.system, "true"),
-        Calls(eval, "1"),
-        Calls(getattr, character, "__globals__"),
-        Calls(operator.attrgetter("real"), 1),
-        Calls(Path, "/"),
-        Calls(functools.partial(os.getcwd)),
-        b"cmsgs_config.character.loading\nfiles\n.",  # a module that another one has imported
-        b"\x80\x04\x8c\x1emsgs_config.character.loading\x8c\tfiles.os\x93.",
-        b"",
-        b"\x80",
+        lambda memory: memory[:-1],
+        lambda memory: memory[:40] + bytes([memory[40] ^ 1]) + memory[41:],
+        lambda memory: bytes(32) + memory[32:],
+        lambda memory: zlib.compress(pickle.dumps((0, Hostile()))),
+        lambda memory: bytes(32) + zlib.compress(pickle.dumps((0, Hostile()))),
+        lambda memory: b"",
     ],
 )
-def test_foreign_bytes_are_an_error_of_one_line(hostile: object) -> None:
-    raw = hostile if isinstance(hostile, bytes) else pickle.dumps((0, hostile))
+def test_what_is_not_sealed_is_not_opened(
+    change: Callable[[bytes], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    foreign = change(MemoryFormat().write("anything"))
+    assert not is_own(foreign)
+    with pytest.raises(RecordingError, match="another user or machine is not opened"):
+        MemoryFormat().read(foreign)
+    assert not (tmp_path / "it-was-opened").exists()
+
+
+def test_the_key_is_this_users_alone_and_the_same_for_all_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = module._key.__wrapped__
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    key = make()
+    (file,) = (each for each in tmp_path.rglob("*") if each.is_file())
+    assert make() == key == file.read_bytes()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+def test_where_it_cannot_be_kept_the_key_is_the_processs_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "file"))
+    first, second = module._key.__wrapped__(), module._key.__wrapped__()
+    assert len(first) == len(second) == 32
+    assert first != second
+
+
+@pytest.mark.parametrize("raw", [b"", b"\x80", pickle.dumps(5)])
+def test_what_another_version_wrote_is_an_error_of_one_line(raw: bytes) -> None:
     with pytest.raises(RecordingError, match="a keyframe cannot be read"):
-        MemoryFormat(PACKAGES).read(raw)
-
-
-def test_the_name_of_a_method_reaches_methods_alone() -> None:
-    made = character("pendulum")
-    memory = MemoryFormat(PACKAGES, made).write(made.effort_limits)
-    for name in (b"__class__", b"__reduce__", b"no_such"):
-        short = memory.replace(b"\x8c\reffort_limits", b"\x8c" + bytes([len(name)]) + name)
-        assert short != memory
-        with pytest.raises(RecordingError, match="a keyframe cannot be read"):
-            MemoryFormat(PACKAGES, made).read(short)
-
-
-def test_a_memory_of_other_parts_is_refused() -> None:
-    memory = MemoryFormat(PACKAGES, character("pendulum")).write("anything")
-    with pytest.raises(RecordingError, match="other parameters or files"):
-        MemoryFormat(PACKAGES, character("humanoid")).read(memory)
-
-
-@pytest.mark.parametrize("change", [lambda raw: raw[:-3], lambda raw: b"\0" + raw, lambda _: b""])
-def test_damage_is_an_error(change: functools.partial[bytes]) -> None:
-    with pytest.raises(RecordingError, match="cannot be read"):
-        unpack(change(pack(b"memory" * 100)))
-
-
-def test_what_unpacks_to_too_much_is_refused() -> None:
-    packer = zlib.compressobj()
-    bomb = b"".join(packer.compress(bytes(1 << 20)) for _ in range(300)) + packer.flush()
-    with pytest.raises(RecordingError, match="too large"):
-        unpack(bomb)
+        MemoryFormat(character("pendulum")).read(sealed(raw))
 
 
 def test_a_message_keeps_stamp_session_and_memory(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from msgs_config.bus.composition import Turns, ros_node
 from msgs_config.bus.node import BusNode, declared_settings
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
+from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, state_in_layout
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import GivenSession, read_session
@@ -56,7 +57,7 @@ class RecordedController(Player):
         self._file = Path(settings.states)
         world, _ = read_world(Path(settings.recording), settings.world)
         self._tick_clock, self._throws = clock_of(world[0]), world[0].throws
-        self._first_tick = first_tick_of(world[0])
+        self._first_tick = _first_tick(world[0])
         self._simulator = self.node.client(topics.SIM_NODE, {"reset": False})
         self._changes = reset_changes(world)
         session = settings.session.id
@@ -145,6 +146,11 @@ class RecordedController(Player):
         return arrays
 
 
+def _first_tick(recording: Recording) -> int:
+    """The tick of the simulator's first state: the keyframe's, or that of a simulator anew."""
+    return FIRST_TICK if recording.keyframe is None else first_tick_of(recording)
+
+
 class _CharacterTopics:
     """The topics of a character: what is sent to it, and the states that come back."""
 
@@ -158,7 +164,7 @@ class _CharacterTopics:
         self.size = recording.layout.size
         self._inputs, self._session = inputs, session
         self._layout, self._clock = recording.layout, clock_of(recording)
-        self._first_tick = first_tick_of(recording)
+        self._first_tick = _first_tick(recording)
         self._decoder = JointStateDecoder()
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
         self._torques = node.publisher(topics.JOINT_TORQUES.under(name))

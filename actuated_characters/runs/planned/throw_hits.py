@@ -34,16 +34,19 @@ def read_states(bag: Path) -> States | None:
 
 
 def describe_hits(
-    plan: RunPlan, throws: Sequence[PlannedThrow], states: States | None
+    plan: RunPlan, throws: Sequence[PlannedThrow], states: States | None, since: float = 0.0
 ) -> list[str]:
-    """Of each throw a few words: whether the ball has hit the character, where, and when."""
+    """Of each throw a few words: whether the ball has hit the character, where, and when.
+
+    The time is told from `since` s before the first of the states.
+    """
     if states is None:
         return ["without a bag that has 'thrown' it is not known whether it hit"] * len(throws)
     in_order = sorted(range(len(throws)), key=lambda index: throws[index].stamp_ns)
     words = [""] * len(throws)
     for ball, index in enumerate(in_order):
         hit = find_hit(plan, [throws[each] for each in in_order], ball, states)
-        words[index] = "missed" if hit is None else f"hit '{hit[1]}' at {hit[0]:.3f} s"
+        words[index] = "missed" if hit is None else f"hit '{hit[1]}' at {since + hit[0]:.3f} s"
     return words
 
 

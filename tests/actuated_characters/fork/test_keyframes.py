@@ -3,22 +3,26 @@
 Runs of one process, with keyframes half a second apart. The oracle is the recorded run itself.
 """
 
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.keyframes import find_keyframes
-from actuated_characters.bags.reader import read_messages
+from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
+from actuated_characters.bags.writer import BagWriter
 from actuated_characters.cli import main
 from actuated_characters.fork.plan import ForkInputs, plan_fork
 from actuated_characters.replay.replay import replay
+from msgs_config import memory
 from msgs_config.bus import keyframe_publisher
-from msgs_config.messages.keyframe import decode_keyframe, encode_keyframe
+from msgs_config.messages.cdr import decode_header
+from msgs_config.messages.keyframe import Keyframe, decode_keyframe, encode_keyframe
+from msgs_config.messages.topic import Quality
 from tests.support.rewriting import rewrite
 from tests.support.runs import summary_of
 
@@ -175,16 +179,23 @@ def test_a_fork_reads_from_its_keyframe_on(walk: Path) -> None:
     assert recording.controller == whole.controller
 
 
+def resealed(keyframe: Keyframe, change: Callable[[bytes], bytes]) -> bytes:
+    """A keyframe's message with something else in its memory, as this user's own."""
+    packed = zlib.compress(change(zlib.decompress(keyframe.memory[32:])))
+    return encode_keyframe(keyframe._replace(memory=memory._seal_of(packed) + packed))
+
+
 @pytest.mark.parametrize("which", ["sim_node", "controller_node"])
-def test_a_damaged_keyframe_is_an_error_of_one_line(
+def test_a_keyframe_of_another_version_is_an_error_of_one_line(
     walk: Path, which: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def damage(raw: bytes) -> bytes:
-        keyframe = decode_keyframe(raw)
-        return encode_keyframe(keyframe._replace(memory=keyframe.memory[:-40]))
-
-    run = tmp_path / "damaged"
-    with_changed(walk, run, f"/{which}/keyframe", damage)
+    run = tmp_path / "other"
+    with_changed(
+        walk,
+        run,
+        f"/{which}/keyframe",
+        lambda raw: resealed(decode_keyframe(raw), lambda content: content[:-40]),
+    )
     capsys.readouterr()
     assert main(["fork", str(run), "--at", "0.7"]) == 1
     (line,) = [x for x in capsys.readouterr().err.splitlines() if x.startswith("error")]
@@ -192,19 +203,56 @@ def test_a_damaged_keyframe_is_an_error_of_one_line(
     assert main(["fork", str(run), "--at", "0.7", "--from-start"]) == 0
 
 
-def test_what_a_keyframe_has_is_compared(walk: Path, tmp_path: Path, capsys: Any) -> None:
+def test_keyframes_of_another_user_are_not_opened(
+    walk: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "_key", lambda: bytes(32))
+    assert plan_fork(walk, 0.7, ForkInputs({})).skipped == 0
+
+
+def test_what_a_keyframe_has_is_compared(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A state in it that is not the recorded one ends the fork."""
     moved = np.float64(read_recording(walk).position[120, 0])
 
-    def change(raw: bytes) -> bytes:
-        keyframe = decode_keyframe(raw)
-        other = np.nextafter(moved, 1.0)
-        assert moved.tobytes() in keyframe.memory
-        memory = keyframe.memory.replace(moved.tobytes(), other.tobytes())
-        return encode_keyframe(keyframe._replace(memory=memory))
+    def change(content: bytes) -> bytes:
+        assert moved.tobytes() in content
+        return content.replace(moved.tobytes(), np.nextafter(moved, 1.0).tobytes())
 
     run = tmp_path / "changed"
-    with_changed(walk, run, "/sim_node/keyframe", change)
+    with_changed(
+        walk, run, "/sim_node/keyframe", lambda raw: resealed(decode_keyframe(raw), change)
+    )
     capsys.readouterr()
     assert main(["fork", str(run), "--at", "0.7"]) == 1
     assert "position of 'root_x'" in capsys.readouterr().err
+
+
+def test_a_keyframe_may_come_behind_its_state(walk: Path, tmp_path: Path) -> None:
+    """As in a bag of another recorder, whose topics are in no order."""
+    messages = list(read_messages(walk / BAG))
+    late = [each for each in messages if each.topic == "/sim_node/keyframe"]
+    others = [each for each in messages if each not in late]
+    after = [
+        number
+        for number, each in enumerate(others)
+        if each.topic == "/joint_states" and decode_header(each.raw)[0] > 504_166_666
+    ]
+    others[after[0] : after[0]] = late
+    write_in_order(tmp_path / "run" / BAG, others)
+    keyframes = find_keyframes(tmp_path / "run" / BAG)
+    assert keyframes is not None
+    (recording,) = read_recordings(tmp_path / "run", keyframes.before(0.7))
+    assert_ends_alike(recording, read_recording(walk))
+    assert len(recording.stamps_ns) == round(0.3 * 240) + 1
+
+
+def write_in_order(bag: Path, messages: list[RecordedMessage]) -> None:
+    """Write messages into a bag one after another."""
+    bag.parent.mkdir()
+    with BagWriter(bag) as writer:
+        for topic, type_name in {each.topic: each.type_name for each in messages}.items():
+            writer.add_topic(topic, type_name, Quality(1))
+        for number, each in enumerate(messages, start=1):
+            writer.write(each.topic, each.raw, number * 10**6)

@@ -157,7 +157,7 @@ def fall(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path
 
 def contract() -> set[str]:
     """Every topic of the table, as it is named in a bag of one character without sensors."""
-    names = {"/sim_node/configuration"}
+    names = {"/sim_node/configuration", "/sim_node/keyframe"}
     for topic in topics.TABLE:
         alone = topic.name.partition("/")[0] in ("imu", "force", "contact_wrenches")
         if not alone and not topic.name.startswith("/tf"):  # whose type is not among the wheels
