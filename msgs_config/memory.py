@@ -9,13 +9,14 @@ only the programs of this user on this machine have, and no others are opened.
 
 import hashlib
 import hmac
+import inspect
 import io
 import os
 import pickle
 import secrets
 import zlib
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,18 @@ class _Counter(pickle.Pickler):
         if not is_plain and id(each) not in self._known:
             self._known.add(id(each))
             self.found.append(each)
+
+    def reducer_override(self, each: object) -> Any:
+        """Leave out what was computed once it was asked for: it is not there from the start."""
+        cached = [name for name in getattr(each, "__dict__", ()) if _is_cached(each, name)]
+        if isinstance(each, type) or not cached:
+            return NotImplemented
+        made, given, state = each.__reduce_ex__(pickle.HIGHEST_PROTOCOL)[:3]
+        return made, given, {name: state[name] for name in state if name not in cached}
+
+
+def _is_cached(owner: object, name: str) -> bool:
+    return isinstance(inspect.getattr_static(type(owner), name, None), cached_property)
 
 
 class _Writer(pickle.Pickler):

@@ -80,15 +80,18 @@ class SimulatorKeyframes:
     def messages(self) -> Iterator[Outgoing]:
         """The keyframe of the present state, if it has one.
 
-        While a push acts there is none: it was not recorded for how long it goes on.
+        There is none of an episode's first state, which follows from the parameters; and while a
+        push acts, because it was not recorded for how long it goes on.
         """
         simulation, session = self._simulation, self._session
         pushes = (push for each in simulation.characters for push in each.pushes)
-        if not any(push.acts_at(simulation.tick) for push in pushes):
-            try:
-                yield from self._publisher.messages(simulation.stamp_ns, session, self._memory)
-            except SimulationError as error:  # the run goes on without
-                self._logger.log_once(f"no keyframe: {error}")
+        acting = any(push.acts_at(simulation.tick) for push in pushes)
+        if acting or simulation.stamp_ns == self.episode_ns:
+            return
+        try:
+            yield from self._publisher.messages(simulation.stamp_ns, session, self._memory)
+        except SimulationError as error:  # the run goes on without
+            self._logger.log_once(f"no keyframe: {error}")
 
     def _memory(self) -> bytes:
         return self._format.write((self._simulation.snapshot(), self.episode_ns))

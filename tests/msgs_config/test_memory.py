@@ -53,6 +53,17 @@ def test_parts_are_those_of_the_reader_and_all_else_is_the_writers() -> None:
     assert len(memory) < 1000 < len(pickle.dumps(theirs))
 
 
+def test_what_was_computed_meanwhile_makes_no_other_parts() -> None:
+    used = character("humanoid")
+    memory = MemoryFormat(used).write(used)
+    computed = [name for name in dir(type(used.layout)) if not name.startswith("_")]
+    assert any(getattr(used.layout, name) is not None for name in computed)
+    assert MemoryFormat(used).read(memory) is used
+    assert MemoryFormat(character("humanoid")).write("anything") == MemoryFormat(used).write(
+        "anything"
+    )
+
+
 def test_a_memory_of_other_parts_is_refused() -> None:
     memory = MemoryFormat(character("pendulum")).write("anything")
     with pytest.raises(RecordingError, match="other parameters or files"):

@@ -16,6 +16,8 @@ BEGINS = (0, 31, 72, 113, 150)
 """The rows of the first states of the episodes."""
 TICKS = 200
 MOON = 1.62  # m/s^2
+KEYFRAMES = {"keyframe_period": 0.3}
+"""The parameter of both nodes: a keyframe is of the row 144; in row 72 an episode begins."""
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
 
 
@@ -54,8 +56,9 @@ def record_changed_episodes(folder: Path, context: Context) -> ChangedEpisodes:
             initial_state="reference",
             max_ticks=TICKS,
             wait_for_subscribers=4,
+            **KEYFRAMES,
         )
-        processes.controller("humanoid", reference="clip", wait_for_subscribers=2)
+        processes.controller("humanoid", reference="clip", wait_for_subscribers=2, **KEYFRAMES)
         assert client.pause(True).success
         client.listen(topics.JOINT_STATES)  # is the fourth, without whom nothing begins
         client.spin_until(lambda: client.states.messages, "the first state")

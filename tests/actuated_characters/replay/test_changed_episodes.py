@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rclpy.context import Context
 
+from actuated_characters.bags.keyframes import find_keyframes
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.cli import main
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
@@ -29,6 +30,7 @@ from tests.support.changed_episodes import (
 from tests.support.physics import character
 from tests.support.runs import summary_of
 
+RATE = 240  # Hz
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 
@@ -140,11 +142,31 @@ def test_a_replay_is_identical(run: Path, recording: Recording, way: str) -> Non
 
 def test_a_fork_without_a_change_is_the_original(run: Path) -> None:
     directory = run.parent / "forked"
-    at = (BEGINS[4] + 10) / 240
+    at = (BEGINS[4] + 10) / RATE
 
-    assert main(["fork", str(run), "--at", f"{at!r}", "--output", str(directory)]) == 0
+    options = ["--at", f"{at!r}", "--from-start", "--output", str(directory)]
+    assert main(["fork", str(run), *options]) == 0
 
     assert summary_of(directory)["state_hash"] == summary_of(run)["state_hash"]
+
+
+def test_from_any_keyframe_all_goes_on_as_it_did(run: Path, recording: Recording) -> None:
+    """With other parameters in force, and with changes and resets yet to come."""
+    keyframes = find_keyframes(run / "bag")
+    assert keyframes is not None
+    rows = [int(np.searchsorted(recording.stamps_ns, each.stamp_ns)) for each in keyframes.places]
+    assert rows == [144]
+
+    for row in rows:
+        directory = run.parent / f"from-{row}"
+        options = ["--at", f"{row / RATE!r}", "--output", str(directory)]
+        assert main(["fork", str(run), *options]) == 0, row
+        part = read_recording(directory)
+        assert part.stamps_ns.tolist() == recording.stamps_ns[row:].tolist()
+        assert part.position.tobytes() == recording.position[row:].tobytes()
+        assert part.velocity.tobytes() == recording.velocity[row:].tobytes()
+        assert part.effort.tobytes() == recording.effort[row:].tobytes()
+        assert main(["replay", str(directory)]) == 0, row
 
 
 def test_changes_are_listed(recording: Recording) -> None:
