@@ -122,7 +122,8 @@ class _Counter(pickle.Pickler):
         cached = [name for name in getattr(each, "__dict__", ()) if _is_cached(each, name)]
         if isinstance(each, type) or not cached:
             return NotImplemented
-        made, given, state = each.__reduce_ex__(pickle.HIGHEST_PROTOCOL)[:3]
+        reduced: Any = each.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
+        made, given, state = reduced[:3]
         return made, given, {name: state[name] for name in state if name not in cached}
 
 
