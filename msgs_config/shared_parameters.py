@@ -58,12 +58,12 @@ class KeyframeSettings(Settings):
         unit="s",
         maximum=1e6,
     )
-    file: str = parameter("", "file of a keyframe, from which the run goes on", name="keyframe")
+    file: str = parameter("", "file of a keyframe, from which the run goes on", name="resume_from")
 
 
 CHARACTER, COLLISION, PLACEMENT = CharacterSource.declared()
 RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
-KEYFRAME_PERIOD, KEYFRAME = KeyframeSettings.declared()
+KEYFRAME_PERIOD, RESUME_FROM = KeyframeSettings.declared()
 
 
 def collides(given: Mapping[str, object]) -> bool:

@@ -23,7 +23,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import CHARACTER, KEYFRAME
+from msgs_config.shared_parameters import CHARACTER, RESUME_FROM
 
 
 def run_fork(
@@ -65,7 +65,7 @@ def _with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
         (simulator, recording.keyframe, topics.SIM_NODE),
         (controller, recording.controller_keyframe, topics.CONTROLLER_NODE),
     ):
-        given[KEYFRAME.name] = write_keyframe(folder, name, raw)
+        given[RESUME_FROM.name] = write_keyframe(folder, name, raw)
     return replace(
         plan,
         simulator=Values(plan.simulator | simulator),

@@ -31,7 +31,7 @@ from actuated_characters.runs.processes import Child, Children
 from msgs_config.errors import ConfigurationError, RecordingError, RunError
 from msgs_config.messages import topics
 from msgs_config.messages.session import SESSION, make_session
-from msgs_config.shared_parameters import CHARACTER, COLLISION, KEYFRAME, PLACEMENT
+from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT, RESUME_FROM
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 from sim_node.physics.settings import SimulationSettings
 
@@ -125,7 +125,7 @@ def _simulator_parameters(
                 "and not every tick has its commands: replay it without --through-topics"
             )
         parameters["command_delay_ticks"] = 0
-    parameters[KEYFRAME.name] = write_keyframe(directory, topics.SIM_NODE, together[0].keyframe)
+    parameters[RESUME_FROM.name] = write_keyframe(directory, topics.SIM_NODE, together[0].keyframe)
     return parameters | {
         "mode": "lockstep",
         "real_time_factor": 0.0,
@@ -225,7 +225,7 @@ def _controller_parameters(directory: Path, recording: Recording) -> dict[str, o
     """The recorded controller's parameters, for one that waits for the player."""
     own_files = {
         CHARACTER.name: str(write_character(directory, recording.character)),
-        KEYFRAME.name: write_keyframe(
+        RESUME_FROM.name: write_keyframe(
             directory, topics.CONTROLLER_NODE, recording.controller_keyframe
         ),
     }

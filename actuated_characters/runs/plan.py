@@ -22,7 +22,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
 from msgs_config.parameters import Values
 from msgs_config.plain_values import as_plain, plain_parameters
-from msgs_config.shared_parameters import KEYFRAME, KEYFRAME_PERIOD, collides, placed
+from msgs_config.shared_parameters import KEYFRAME_PERIOD, RESUME_FROM, collides, placed
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, CharacterSettings, as_values, describe_start
 from sim_node.node_settings import NodeSettings
@@ -40,7 +40,7 @@ _SET_BY_RUN = {
     "character": "--character, for both nodes",
     "characters": "no run, which has one character; start sim_node itself for several",
     INITIAL_STATE: "the run itself: where the reference begins, unless initial_position says it",
-    KEYFRAME.name: "`fork`, whose run goes on from there",
+    RESUME_FROM.name: "`fork`, whose run goes on from there",
     "max_ticks": "--duration",
     "session": "the run itself, which makes one for all its nodes",
     "wait_for_subscribers": "the run itself: all of them, so that nothing goes unrecorded",
