@@ -394,7 +394,9 @@ def balance(folder: Path) -> Path:
     """A run of a controller that has a memory, and listens to sensors."""
     sensors = [sensor.topic for sensor in character("humanoid").sensors]
     with recorded(folder / "balance", sensors=sensors) as together:
-        simulator = together.simulator("humanoid", rate=1000, max_ticks=300, wait_for_subscribers=2)
+        simulator = together.simulator(
+            "humanoid", rate=1000, max_ticks=1000, wait_for_subscribers=2
+        )  # a busy recorder finds the commands of a foreign node only after hundreds of ticks
         controller = together.python(str(EXAMPLE.with_name("balance.py")))
         assert simulator.wait(120.0) == 0
         controller.end()
