@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import partial
 
 from controller_node.actuation import describe_actuation
 from controller_node.behaviours.base import Surroundings
@@ -226,10 +225,8 @@ class ControllerNode(ComposableNode):
     def _answer_state(
         self, raw: bytes, state: StampedState, episode_ns: int, surroundings: Surroundings
     ) -> None:
-        setup, session = self._setups.in_force, self._simulators.bound or ANONYMOUS
-        write = partial(setup.keyframe_format.write, setup.controller)
-        if not self._simulators.runs_on:  # there it would come late, and nobody forks that
-            publish_together(self._keyframes.messages(state.stamp_ns, session, write))
+        if self._keyframes.is_due(state.stamp_ns) and not self._simulators.runs_on:
+            self._publish_keyframe(state.stamp_ns)  # in real time it would delay the answer
         started = time.perf_counter()
         self._is_answering = True
         effort, reference = self._controller.compute_effort(state, episode_ns, *surroundings)
@@ -242,6 +239,12 @@ class ControllerNode(ComposableNode):
         self._outputs.publish(self._last_reply)
         if self._upcoming is not None:
             self._take_parameters(self._upcoming)
+
+    def _publish_keyframe(self, stamp_ns: int) -> None:
+        """Publish what this controller goes on from, before its answer to a stamp's state."""
+        setup, session = self._setups.in_force, self._simulators.bound or ANONYMOUS
+        memory = setup.keyframe_format.write(setup.controller)
+        publish_together(self._keyframes.messages(stamp_ns, session, memory))
 
     def _is_answered(self, raw: bytes) -> bool:
         """Whether a state, serialised, is the one that was answered last, of the same simulator."""

@@ -84,19 +84,22 @@ def _seal_of(packed: bytes) -> bytes:
 @cache
 def _key() -> bytes:
     """This user's key, made when it is first needed; if it cannot be kept, the process's own."""
-    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    state = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")
     file = Path(state, "actuated_characters", "keyframes.key")
     new = secrets.token_bytes(_SEAL_BYTES)
     with suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
         own = file.with_name(f"{file.name}.{os.getpid()}")
         own.touch(mode=0o600)
-        own.write_bytes(new)
-        with suppress(FileExistsError):  # another process was faster
-            os.link(own, file)
-        own.unlink()
+        try:
+            own.write_bytes(new)
+            os.link(own, file)  # fails if another process was faster
+        finally:
+            own.unlink()
     with suppress(OSError):
-        new = file.read_bytes()
+        kept = file.read_bytes()
+        if len(kept) == _SEAL_BYTES:
+            return kept
     return new
 
 

@@ -87,7 +87,7 @@ def _is_unchanged(recording: Recording) -> bool:
 def describe_new_hits(fork: ForkPlan, directory: Path) -> Sequence[str]:
     """Of each new throw a few words on whether it hit; none where other balls may be there."""
     balls = fork.recording.balls[0] if fork.recording.balls else None
-    if fork.resets or (balls is not None and balls.names):
+    if not fork.throws or fork.resets or (balls is not None and balls.names):
         return ()
     throws = [*fork.repeated_throws, *fork.throws]
     since = fork.skipped / fork.plan.simulation.rate_hz

@@ -1,7 +1,7 @@
 """Publishes keyframes of a node: all that it goes on from in the state of a stamp."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from msgs_config.bus.node import BusNode
 from msgs_config.bus.publishing import Outgoing, has_subscribers
@@ -31,18 +31,18 @@ class KeyframePublisher:
         self._ticks = max(round(period_s * clock.rate_hz), 1)
         self._every = 1  # periods from one keyframe to the next, by the size of the last
 
-    def messages(
-        self, stamp_ns: int, session: str, write: Callable[[], bytes]
-    ) -> Iterator[Outgoing]:
-        """The keyframe of a stamp's state, if there is one; `write` makes the memory."""
+    def is_due(self, stamp_ns: int) -> bool:
+        """Whether the keyframe of a stamp's state is to be made; asked for in each tick."""
         if not self._period_s:
-            return
+            return False
         period, remainder = divmod(self._clock.tick(stamp_ns) - FIRST_TICK, self._ticks)
         is_due = self._at_once or (period and not remainder and not period % self._every)
-        if not is_due or not has_subscribers(self._publisher):
-            return
-        raw = encode_keyframe(Keyframe(stamp_ns, session, write()))
+        return bool(is_due) and has_subscribers(self._publisher)
+
+    def messages(self, stamp_ns: int, session: str, memory: bytes) -> Iterator[Outgoing]:
+        """The keyframe of a stamp's state, for which one is due, unless it is too large by now."""
+        raw = encode_keyframe(Keyframe(stamp_ns, session, memory))
         self._every = math.ceil(len(raw) / (self._period_s * _BYTES_PER_SECOND))
-        if self._at_once or period % self._every == 0:
+        if self.is_due(stamp_ns):
             self._at_once = False
             yield self._publisher, raw

@@ -83,15 +83,16 @@ class SimulatorKeyframes:
         There is none of an episode's first state, which follows from the parameters; and while a
         push acts, because it was not recorded for how long it goes on.
         """
-        simulation, session = self._simulation, self._session
+        simulation = self._simulation
+        if not self._publisher.is_due(simulation.stamp_ns):
+            return
         pushes = (push for each in simulation.characters for push in each.pushes)
         acting = any(push.acts_at(simulation.tick) for push in pushes)
         if acting or simulation.stamp_ns == self.episode_ns:
             return
         try:
-            yield from self._publisher.messages(simulation.stamp_ns, session, self._memory)
+            memory = self._format.write((simulation.snapshot(), self.episode_ns))
         except SimulationError as error:  # the run goes on without
             self._logger.log_once(f"no keyframe: {error}")
-
-    def _memory(self) -> bytes:
-        return self._format.write((self._simulation.snapshot(), self.episode_ns))
+            return
+        yield from self._publisher.messages(simulation.stamp_ns, self._session, memory)

@@ -133,3 +133,19 @@ def test_a_picture_is_no_keyframe(tmp_path: Path) -> None:
         decode_keyframe(typed.encode(picture))
     with pytest.raises(RecordingError, match="cannot be read: No such file"):
         read_keyframe(str(tmp_path / "none"))
+
+
+def test_a_key_that_was_cut_short_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With an empty key anybody could seal."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    folder = tmp_path / "actuated_characters"
+    folder.mkdir()
+    (folder / "keyframes.key").touch()
+    assert len(module._key.__wrapped__()) == 32
+    assert [each.name for each in folder.iterdir()] == ["keyframes.key"]
+
+
+def test_a_user_without_a_home_has_a_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("XDG_STATE_HOME")
+    monkeypatch.setenv("HOME", "/proc/none")
+    assert len(module._key.__wrapped__()) == 32
