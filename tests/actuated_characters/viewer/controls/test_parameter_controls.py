@@ -99,9 +99,10 @@ def test_the_clip_and_gravity_of_a_menu_come_with_the_next_reset(
 
     client.spin_until(lambda: len(episode) > before, "the next episode")
     begin = episode.last.stamp
-    client.spin_until(
-        lambda: any(each.header.stamp == begin for each in references.messages), "its reference"
-    )
+    for heard, what in ((references, "its reference"), (client.states, "its state")):
+        client.spin_until(
+            lambda heard=heard: any(each.header.stamp == begin for each in heard.messages), what
+        )
     reference = next(each for each in references.messages if each.header.stamp == begin)
     state = next(each for each in client.states.messages if each.header.stamp == begin)
     assert np.allclose(state.position, reference.position, rtol=0.0, atol=1e-9)
