@@ -7,12 +7,15 @@ class LossCount:
     """Finds gaps in the numbers that each publisher gives its own messages: 1, 2, 3 and so on.
 
     The numbers do not say which publisher they are of. A number that follows none of the last ones
-    is the first of another publisher as long as there are more publishers than are known, and comes
-    after a gap otherwise. Messages before the first number that came are not missed.
+    is the first of another publisher as long as there have been more publishers than are known, and
+    comes after a gap otherwise. Messages before the first number that came are not missed.
     """
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
-        """`count_publishers` says how many there are; asked only where a number does not follow."""
+        """`count_publishers` says how many there have been, whether or not they are still there.
+
+        It is asked only where a number does not follow.
+        """
         self._count_publishers = count_publishers
         self._last: list[int] = []  # each publisher's last number, the most recent one at the end
         self.lost_messages = 0

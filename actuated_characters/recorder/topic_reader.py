@@ -17,7 +17,6 @@ class TopicReader:
         """Subscribe. Publishers whose quality of service does not fit are logged, once."""
         self._node = node
         self.recorded = recorded
-        self._loss = LossCount(lambda: int(node.count_publishers(recorded.name)))
         self._last_ns = 0
         self._is_refused = False
         self._subscription = DirectSubscription(
@@ -25,6 +24,7 @@ class TopicReader:
             recorded.topic.for_listener(),
             SubscriptionEventCallbacks(incompatible_qos=self._refuse, use_default_callbacks=False),
         )
+        self._loss = LossCount(self._subscription.count_publishers_ever)
 
     @property
     def lost_messages(self) -> int:

@@ -12,6 +12,7 @@ from collections import deque
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 from msgs_config.bus.endpoint_types import EndpointTypes
@@ -24,6 +25,7 @@ _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # turns of the executor in a row, with one callback each
 _MOST_DISCARDED = 20_000  # messages, more than can wait
 _BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
+_MATCHED = rclpy_implementation.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MATCHED
 
 
 class DirectSubscription:
@@ -88,6 +90,14 @@ class DirectSubscription:
             return self._pending.popleft()
         taken = self._take_message(self._message_type, True)
         return None if taken is None else _received(*taken)
+
+    def count_publishers_ever(self) -> int:
+        """How many publishers it has heard of, those that are gone among them."""
+        # Asked of the middleware itself: a callback would come after the publisher's messages.
+        with self._subscription.handle:
+            matched = rclpy_implementation.EventHandle(self._subscription.handle, _MATCHED)
+        with matched:
+            return int(matched.take_event().total_count)
 
 
 def _received(raw: bytes, info: dict[str, int]) -> Received:

@@ -344,3 +344,24 @@ def test_a_topic_gives_no_more_at_a_time_than_is_asked_for(client: SimulatorClie
     assert publisher.wait_for_all_acked(Duration(seconds=30))
 
     assert [len(list(inbox.take(5))) for _ in range(4)] == [5, 5, 2, 0]
+
+
+def test_publishers_that_are_gone_before_their_messages_are_taken_have_lost_nothing(
+    client: SimulatorClient,
+) -> None:
+    # a recorder on a busy machine takes the last diagnostics of nodes that have ended
+    topic = Topic("flood", "std_msgs/msg/Header", STREAM)
+    inbox = TopicReader(client.node, RecordedTopic(topic, "/flood", "flood", None))
+    publishers = [client.speak(topic) for _ in range(3)]
+    client.spin_until(
+        lambda: all(each.get_subscription_count() for each in publishers), "a recorder's inbox"
+    )
+    for number in [0, 1, 0, 1, 2, 0, 1]:
+        publishers[number].publish(Header())
+    for each in publishers:
+        assert each.wait_for_all_acked(Duration(seconds=30))
+        assert client.node.destroy_publisher(each)
+    client.spin_until(lambda: not client.node.count_publishers("/flood"), "their end")
+
+    assert len(list(inbox.take(100))) == 7
+    assert inbox.lost_messages == 0
