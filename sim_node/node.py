@@ -91,8 +91,10 @@ class SimNode(ComposableNode):
 
     def _build_simulation(self, loaded: SimulatorParameters) -> None:
         """Build the world, and probe the engine."""
-        gravity = WorldSettings.of(loaded.values).gravity
-        self._samples = [measure_probe(each.character, gravity) for each in loaded.characters]
+        world = WorldSettings.of(loaded.values)
+        self._samples = [
+            measure_probe(each.character, world.gravity, world.engine) for each in loaded.characters
+        ]
         self._simulation = make_simulation(loaded)
         self._initial_states = InitialStates(self.node, self._simulation.characters, loaded)
 

@@ -26,8 +26,9 @@ from msgs_config.shared_parameters import KEYFRAME_PERIOD, RESUME_FROM, collides
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, CharacterSettings, as_values, describe_start
 from sim_node.node_settings import NodeSettings
+from sim_node.physics.engine import describe_default_engine
 from sim_node.physics.probe import measure_probe
-from sim_node.physics.settings import STEADY_CONTACTS, SimulationSettings
+from sim_node.physics.settings import STEADY_CONTACTS, SimulationSettings, WorldSettings
 from sim_node.physics.short_links import describe_speed_bound
 
 SHARED = (
@@ -122,10 +123,11 @@ def make_plan(
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)
     settings = SimulationSettings.of(simulator)
-    _check_engines(character, settings.world.gravity)
+    _check_engines(character, settings.world)
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings
     warnings += describe_start(character, simulator) + describe_speed_bound(character, settings)
+    warnings += describe_default_engine(settings.world.engine)
     return RunPlan(character, motion.reference, simulator, controller, warnings)
 
 
@@ -178,9 +180,9 @@ def _simulator_values(character: Character, given: Mapping[str, object], duratio
     return values
 
 
-def _check_engines(character: Character, gravity: float) -> None:
-    model, probe = DynamicsModel(character, gravity), measure_probe(character, gravity)
-    check_agreement(model, character.layout, probe)
+def _check_engines(character: Character, world: WorldSettings) -> None:
+    probe = measure_probe(character, world.gravity, world.engine)
+    check_agreement(DynamicsModel(character, world.gravity), character.layout, probe)
 
 
 def _shared(

@@ -7,7 +7,6 @@ MuJoCo's, which is not the simulator's, and so what is foreseen is not quite wha
 
 from collections.abc import Iterator
 from itertools import product
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -19,10 +18,14 @@ from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config.arrays import FloatArray
-from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
-from msgs_config.character.meshes.triangles import is_converted, read_vertices
-from msgs_config.character.model import Character, Link, Shape, ShapeType
-from msgs_config.geometry import rotations
+from msgs_config.character.model import Character, Link
+from msgs_config.character.mujoco_model import (
+    add_links,
+    ancestors,
+    compile_exactly,
+    geometry,
+    quaternion_starts,
+)
 
 _SOLVER_ITERATIONS = 6
 _CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world
@@ -32,14 +35,6 @@ _UNUSED_PARTS = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR
 
 _GROUND = "ground"
 _BY_PAIRS = {"contype": 0, "conaffinity": 0}  # explicit pairs say which shapes may touch
-
-_GEOMETRIES = {
-    ShapeType.BOX: mujoco.mjtGeom.mjGEOM_BOX,
-    ShapeType.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,
-    ShapeType.CYLINDER: mujoco.mjtGeom.mjGEOM_CYLINDER,
-    ShapeType.CAPSULE: mujoco.mjtGeom.mjGEOM_CAPSULE,
-    ShapeType.MESH: mujoco.mjtGeom.mjGEOM_MESH,
-}
 
 
 class ContactModel:
@@ -171,39 +166,19 @@ def _compile(
     )
     plane = mujoco.mjtGeom.mjGEOM_PLANE
     spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), name=_GROUND, **_BY_PAIRS)
-    for link, body in zip(character.links, add_links(spec, character), strict=True):
+    for link, body in zip(character.links, add_links(spec, character.links), strict=True):
         if np.isfinite(link.joint.lower):
             (joint,) = body.joints
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.range = (link.joint.lower, link.joint.upper)
             joint.solref_limit = _LIMIT
         for name, shape in zip(_names(link), link.collision_shapes, strict=True):
-            body.add_geom(name=name, **_geometry(spec, shape), **_BY_PAIRS)
+            body.add_geom(name=name, **geometry(spec, shape), **_BY_PAIRS)
     for one, other in _touching(character):
         pair = spec.add_pair(geomname1=one, geomname2=other)
         pair.condim, pair.solref = 3, _CONTACT
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
-    return compile_exactly(spec, character)
-
-
-def _geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:
-    """A shape as MuJoCo has it, which takes half of what a length is; of a mesh its hull."""
-    turn = rotations.wxyz_from_xyzw(np.array(shape.pose.orientation_xyzw))
-    place: dict[str, object] = {"type": _GEOMETRIES[shape.type], "pos": shape.pose.position}
-    place["quat"] = turn
-    if shape.type is ShapeType.MESH:
-        mesh = spec.add_mesh(scale=shape.size)
-        if is_converted(Path(shape.mesh)):
-            mesh.uservert = read_vertices(Path(shape.mesh)).ravel()
-        else:
-            mesh.file = shape.mesh
-        mesh.name = f"mesh {len(spec.meshes)}"
-        return {**place, "meshname": mesh.name}
-    if shape.type is ShapeType.BOX:
-        return {**place, "size": tuple(0.5 * edge for edge in shape.size)}
-    radius, *length = shape.size
-    half = 0.5 * length[0] if length else 0.0
-    return {**place, "size": (radius, half, 0.0)}
+    return compile_exactly(spec, character.links)
 
 
 def _names(link: Link) -> list[str]:
@@ -217,13 +192,6 @@ def _touching(character: Character) -> Iterator[tuple[str, str]]:
     for index, link in enumerate(links):
         yield from product(_names(link), [_GROUND])
         if character.loading.self_collision:
-            above = _ancestors(character, index)
+            above = ancestors(character, index)
             for other in (other for other in range(index) if other not in above):
                 yield from product(_names(link), _names(links[other]))
-
-
-def _ancestors(character: Character, index: int) -> set[int]:
-    found: set[int] = set()
-    while (index := character.links[index].parent) >= 0:
-        found.add(index)
-    return found

@@ -4,19 +4,11 @@ import mujoco
 import numpy as np
 
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character, Joint, Link
+from msgs_config.character.model import Character
+from msgs_config.character.mujoco_model import add_links, compile_exactly, quaternion_starts
 from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
-_NAME = "link "  # before each link's, because MuJoCo's own body is called `world`
-
-_MUJOCO_TYPES = {
-    JointType.REVOLUTE: mujoco.mjtJoint.mjJNT_HINGE,
-    JointType.PRISMATIC: mujoco.mjtJoint.mjJNT_SLIDE,
-    JointType.SPHERICAL: mujoco.mjtJoint.mjJNT_BALL,
-    JointType.FLOATING: mujoco.mjtJoint.mjJNT_FREE,
-}
 
 
 class DynamicsModel:
@@ -283,71 +275,9 @@ def still_model(character: Character, position: FloatArray) -> DynamicsModel:
     return model
 
 
-def quaternion_starts(model: mujoco.MjModel) -> list[int]:
-    """First entry of each quaternion among MuJoCo's positions."""
-    before = {int(mujoco.mjtJoint.mjJNT_BALL): 0, int(mujoco.mjtJoint.mjJNT_FREE): 3}
-    return [
-        int(address) + before[int(kind)]
-        for address, kind in zip(model.jnt_qposadr, model.jnt_type, strict=True)
-        if int(kind) in before
-    ]
-
-
 def _compile(character: Character, gravity: float) -> mujoco.MjModel:
     """MuJoCo's model of a character, its bodies in the order of the character's links."""
     spec = mujoco.MjSpec()
     spec.option.gravity = (0.0, 0.0, -gravity)
-    add_links(spec, character)
-    return compile_exactly(spec, character)
-
-
-def add_links(spec: mujoco.MjSpec, character: Character) -> list[mujoco.MjsBody]:
-    """Add a character's links and joints, without shapes; the bodies are in the links' order."""
-    bodies = [spec.worldbody]
-    for link in character.links:
-        bodies.append(_add_body(bodies[link.parent + 1], link))
-    return bodies[1:]
-
-
-def compile_exactly(spec: mujoco.MjSpec, character: Character) -> mujoco.MjModel:
-    """Compile a model with the links of a character, whose inertia is kept to the last bit."""
-    spec.compiler.balanceinertia = False
-    model = spec.compile()
-    # set afterwards: the compiler refuses a link without mass or inertia, which is sound wherever
-    # the joints above it do not move it alone
-    model.body_inertia[1:] = [link.inertia_diagonal for link in character.links]
-    _set_masses(model, [link.mass for link in character.links])
-    model.dof_simplenum[:] = 0  # else a simple body keeps the mass matrix as compiled
-    return model
-
-
-def _set_masses(model: mujoco.MjModel, masses: list[float]) -> None:
-    """Set the masses of all bodies but the world's, and what MuJoCo has of their sums."""
-    if model.body_mass[1:].tolist() == masses:
-        return
-    model.body_mass[1:] = masses
-    model.body_subtreemass[:] = model.body_mass
-    for body in range(model.nbody - 1, 0, -1):
-        model.body_subtreemass[model.body_parentid[body]] += model.body_subtreemass[body]
-
-
-def _add_body(parent: mujoco.MjsBody, link: Link) -> mujoco.MjsBody:
-    pose, inertial = link.joint.pose_in_parent, link.inertial_pose
-    body = parent.add_body(
-        name=_NAME + link.name,
-        pos=pose.position,
-        quat=rotations.wxyz_from_xyzw(np.array(pose.orientation_xyzw)),
-        mass=link.mass or 1.0,
-        ipos=inertial.position,
-        iquat=rotations.wxyz_from_xyzw(np.array(inertial.orientation_xyzw)),
-        inertia=(1.0, 1.0, 1.0),
-        explicitinertial=True,
-    )
-    if link.joint.type is not JointType.FIXED:
-        _add_joint(body, link.joint)
-    return body
-
-
-def _add_joint(body: mujoco.MjsBody, joint: Joint) -> None:
-    axis = joint.axis_in_child if any(joint.axis_in_child) else (0.0, 0.0, 1.0)
-    body.add_joint(name=joint.name, type=_MUJOCO_TYPES[joint.type], axis=axis)
+    add_links(spec, character.links)
+    return compile_exactly(spec, character.links)

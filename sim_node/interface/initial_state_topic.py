@@ -21,6 +21,7 @@ from sim_node.initial_state import (
 from sim_node.interface.publisher_diagnosis import describe_publishers, publisher_names
 from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters
+from sim_node.physics.engine import describe_default_engine
 from sim_node.physics.settings import SimulationSettings
 from sim_node.physics.short_links import describe_speed_bound
 from sim_node.physics.simulated_character import SimulatedCharacter
@@ -154,7 +155,12 @@ class _Subscription:
 
 
 def log_warnings(node: BusNode, parameters: SimulatorParameters) -> None:
-    """Log likely mistakes in files, where a character begins below the ground, and its bounds."""
+    """Log likely mistakes in files, where a character begins below the ground, and its bounds.
+
+    And an engine that stands in for another one.
+    """
+    for warning in describe_default_engine(SimulationSettings.of(parameters.values).world.engine):
+        node.get_logger().warning(warning)
     for each in parameters.characters:
         character, values = each.character, each.values
         bound = describe_speed_bound(character, SimulationSettings.of(values))

@@ -61,8 +61,9 @@ class SimulatorPublisher:
         sensing = NodeSettings.of(parameters.values).sensing
         for each in self.of_characters:
             each.change_sensing(sensing)
+        engine = self._simulation.settings.world.engine
         self._samples = [
-            measure_probe(each.character, sensing.gravity) for each in parameters.characters
+            measure_probe(each.character, sensing.gravity, engine) for each in parameters.characters
         ]
         if self._is_configured:
             self.publish_configurations(parameters, since_ns)

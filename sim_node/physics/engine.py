@@ -5,11 +5,14 @@ All positions, velocities and efforts are (n,) arrays in message form, and array
 row a link, in the order of `Character.links`. Frames are URDF link frames, axes the world's.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Protocol, Self
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
 from msgs_config.messages.throw import ProjectileThrow
 
 if TYPE_CHECKING:
@@ -78,7 +81,9 @@ class Body(Protocol):
 class Balls(Protocol):
     """The balls of a world, solid spheres, in the order in which they were thrown."""
 
-    throws: tuple[ProjectileThrow, ...]
+    @property
+    def throws(self) -> tuple[ProjectileThrow, ...]:
+        """The throw of each ball."""
 
     def add(self, throw: ProjectileThrow) -> None:
         """Let a ball go: put it into the world with the position and velocity of the throw."""
@@ -152,12 +157,55 @@ class World(Protocol):
         """
 
 
+@dataclass(frozen=True)
+class Engine:
+    """An engine that worlds can be simulated with."""
+
+    package: str  # Python's name of what it takes
+    make_world: Callable[["WorldSettings"], World]
+
+
+def _make_bullet_world(settings: "WorldSettings") -> World:
+    from sim_node.physics.bullet.world import BulletWorld  # an engine is loaded where it is used
+
+    return BulletWorld(settings)
+
+
+def _make_mujoco_world(settings: "WorldSettings") -> World:
+    from sim_node.physics.mujoco.world import MujocoWorld
+
+    return MujocoWorld(settings)
+
+
+ENGINES = {
+    "bullet": Engine("pybullet", _make_bullet_world),
+    "mujoco": Engine("mujoco", _make_mujoco_world),
+}
+"""By name, the preferred one first."""
+
+DEFAULT_ENGINE = next(name for name, engine in ENGINES.items() if find_spec(engine.package))
+"""The first engine that is installed."""
+
+
+def describe_default_engine(engine: str) -> tuple[str, ...]:
+    """Warnings if an engine is the default one in place of one that is not installed."""
+    preferred = next(iter(ENGINES))
+    if engine != DEFAULT_ENGINE or preferred == DEFAULT_ENGINE:
+        return ()
+    return (f"{ENGINES[preferred].package} is not installed, so the engine is {engine}",)
+
+
 def make_world(settings: "WorldSettings") -> World:
     """A world without characters.
 
     Raises:
+        ConfigurationError: the engine is not installed.
         CharacterError: the terrain cannot be loaded.
     """
-    from sim_node.physics.bullet.world import BulletWorld  # an engine is loaded where it is used
-
-    return BulletWorld(settings)
+    engine = ENGINES[settings.engine]
+    if find_spec(engine.package) is None:
+        raise ConfigurationError(
+            f"parameter 'engine' is {settings.engine}, but {engine.package} is not installed; "
+            f"install it, or take {DEFAULT_ENGINE}"
+        )
+    return engine.make_world(settings)

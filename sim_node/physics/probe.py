@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
-from sim_node.physics.engine import Body, World, make_world
+from sim_node.physics.engine import DEFAULT_ENGINE, Body, World, make_world
 from sim_node.physics.settings import WorldSettings
 
 INSTANT = 1e-7
@@ -23,12 +23,14 @@ _MAX_DAMPED_SHARE = 1e-3
 _ACCELERATION = 10.0  # rad/s^2 or m/s^2 that one effort alone leads to, at the most
 
 
-def still_settings(gravity: float) -> WorldSettings:
+def still_settings(gravity: float, engine: str = DEFAULT_ENGINE) -> WorldSettings:
     """A world without ground, which advances by an instant."""
-    return WorldSettings(step_s=INSTANT, gravity=gravity, ground=False)
+    return WorldSettings(engine=engine, step_s=INSTANT, gravity=gravity, ground=False)
 
 
-def measure_probe(character: Character, gravity: float) -> DynamicsSample:
+def measure_probe(
+    character: Character, gravity: float, engine: str = DEFAULT_ENGINE
+) -> DynamicsSample:
     """What the engine makes of a character: one dynamics sample.
 
     The sample's state is off the rest pose and within all limits; it moves in every degree of
@@ -38,6 +40,7 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     Args:
         character: The character.
         gravity: Gravity in m/s^2 along -z.
+        engine: The engine.
 
     Raises:
         CharacterError: some degree of freedom cannot move, or moves neither mass nor inertia.
@@ -46,7 +49,7 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     rng = np.random.default_rng(_SEED)
     position = _position(character, rng)
     velocity = rng.uniform(-_SPEED, _SPEED, layout.size)
-    with make_world(still_settings(gravity=0.0)) as world:
+    with make_world(still_settings(0.0, engine)) as world:
         body = _add_without_collisions(world, character)
         inverse_mass = _inverse_mass_matrix(world, body, character)
         _check_inverse_mass(character, np.diag(inverse_mass))

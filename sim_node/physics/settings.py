@@ -3,6 +3,7 @@
 from msgs_config.character.model import UrdfOptions
 from msgs_config.settings import Settings, parameter, shared
 from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
+from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
 
 STEADY_CONTACTS = {"contact_breaking_threshold": 0.1}
 """Parameters of a world in which a loaded foot stands on all of its sole."""
@@ -11,6 +12,11 @@ STEADY_CONTACTS = {"contact_breaking_threshold": 0.1}
 class WorldSettings(Settings):
     """The physics of the world. Its parameters may change at a reset."""
 
+    engine: str = parameter(
+        DEFAULT_ENGINE,
+        "what simulates the world: bullet, if PyBullet is installed, or mujoco",
+        choices=tuple(ENGINES),
+    )
     gravity: float = shared(GRAVITY)  # m/s^2, along -z
     friction: float = parameter(
         0.9,

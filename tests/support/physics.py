@@ -8,7 +8,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 
 from controller_node import parameters as for_controller
@@ -24,8 +26,8 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
 from sim_node import parameters as for_simulator
-from sim_node.physics.bullet.body import BulletBody
-from sim_node.physics.bullet.world import BulletWorld
+from sim_node.physics.engine import Body, make_world
+from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharacter
 from sim_node.physics.simulation import Simulation
@@ -102,14 +104,17 @@ def random_rotation_vector(rng: np.random.Generator) -> FloatArray:
     return direction / np.linalg.norm(direction) * rng.uniform(0.0, 3.14)
 
 
-def touches(body: BulletBody) -> bool:
+def touches(body: Any) -> bool:
     """Whether any link is in contact with anything, or about to be."""
+    if isinstance(body, MujocoBody):
+        mujoco.mj_fwdPosition(body._world.model, body._world.data)
+        return bool(body._world.data.ncon)
     pybullet.performCollisionDetection(physicsClientId=body._client)
     return bool(pybullet.getContactPoints(physicsClientId=body._client))
 
 
 def free_random_state(
-    body: BulletBody, whole: Character, rng: np.random.Generator
+    body: Body, whole: Character, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """A random state that the body is put into, drawn again until it touches nothing."""
     for _ in range(100):
@@ -136,12 +141,21 @@ class DenseDynamics:
         return self.bias
 
 
-class LoneWorld(BulletWorld):
-    """A world of one character."""
+class LoneWorld:
+    """A world of one character; all else of it is the engine's own."""
 
     def __init__(self, whole: Character, settings: WorldSettings) -> None:
-        super().__init__(settings)
-        self.body = self.add(whole)
+        self._world = make_world(settings)
+        self.body = self._world.add(whole)
+
+    def __enter__(self) -> "LoneWorld":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._world.close()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._world, name)
 
 
 class LoneSimulation(Simulation):
@@ -195,23 +209,12 @@ class LinkMotion:
         return orbital + self.inertia @ self.angular_velocity
 
 
-def link_motions(body: BulletBody, whole: Character) -> list[LinkMotion]:
+def link_motions(body: Any, whole: Character) -> list[LinkMotion]:
     """The motion of every link, in the character's order, by the engine's numbers."""
     motions = []
-    for link, number in zip(whole.links, link_numbers(body, whole), strict=True):
-        if number < 0:
-            centre, turn = pybullet.getBasePositionAndOrientation(
-                body._body, physicsClientId=body._client
-            )
-            velocity, angular = pybullet.getBaseVelocity(body._body, physicsClientId=body._client)
-        else:
-            centre, turn, *_, velocity, angular = pybullet.getLinkState(
-                body._body,
-                number,
-                computeLinkVelocity=1,
-                computeForwardKinematics=1,
-                physicsClientId=body._client,
-            )
+    of_link = _motion_by_mujoco if isinstance(body, MujocoBody) else _motion_by_bullet
+    for row, link in enumerate(whole.links):
+        centre, turn, velocity, angular = of_link(body, whole, row)
         axes = rotations.matrix(np.array(turn))
         motions.append(
             LinkMotion(
@@ -226,7 +229,39 @@ def link_motions(body: BulletBody, whole: Character) -> list[LinkMotion]:
     return motions
 
 
-def link_numbers(body: BulletBody, whole: Character) -> list[int]:
+def _motion_by_mujoco(body: MujocoBody, whole: Character, row: int) -> tuple[Any, ...]:
+    """Centre, turn xyzw of the inertial frame, velocity and angular velocity of a link."""
+    model, data = body._world.model, mujoco.MjData(body._world.model)
+    data.qpos[:], data.qvel[:] = body._world.data.qpos, body._world.data.qvel
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    number, velocity = body.place.links.start + row, np.zeros(6)
+    mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, number, velocity, 0)
+    turn, axes = np.zeros(4), data.ximat[number]
+    mujoco.mju_mat2Quat(turn, axes)
+    return data.xipos[number], turn[[1, 2, 3, 0]], velocity[3:], velocity[:3]
+
+
+def _motion_by_bullet(body: Any, whole: Character, row: int) -> tuple[Any, ...]:
+    """Centre, turn xyzw of the inertial frame, velocity and angular velocity of a link."""
+    number = link_numbers(body, whole)[row]
+    if number < 0:
+        centre, turn = pybullet.getBasePositionAndOrientation(
+            body._body, physicsClientId=body._client
+        )
+        velocity, angular = pybullet.getBaseVelocity(body._body, physicsClientId=body._client)
+        return centre, turn, velocity, angular
+    centre, turn, *_, velocity, angular = pybullet.getLinkState(
+        body._body,
+        number,
+        computeLinkVelocity=1,
+        computeForwardKinematics=1,
+        physicsClientId=body._client,
+    )
+    return centre, turn, velocity, angular
+
+
+def link_numbers(body: Any, whole: Character) -> list[int]:
     """The engine's number of every link, in the character's order; -1 is the base."""
     count = pybullet.getNumJoints(body._body, physicsClientId=body._client)
     infos = [
@@ -236,13 +271,13 @@ def link_numbers(body: BulletBody, whole: Character) -> list[int]:
     return [-1, *(numbers[link.name] for link in whole.links[1:])]
 
 
-def link_number(body: BulletBody, whole: Character, joint_name: str) -> int:
+def link_number(body: Any, whole: Character, joint_name: str) -> int:
     """The engine's number of the link that a joint moves."""
     index = [link.joint.name for link in whole.links].index(joint_name)
     return link_numbers(body, whole)[index]
 
 
-def link_poses(body: BulletBody, whole: Character) -> tuple[FloatArray, FloatArray]:
+def link_poses(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
     """Origins (links, 3) and quaternions xyzw (links, 4) of the link frames in the world.
 
     From the inertial frames: what the engine says of link frames has single precision.
@@ -257,12 +292,12 @@ def link_poses(body: BulletBody, whole: Character) -> tuple[FloatArray, FloatArr
     return np.array(origins), np.array(turns)
 
 
-def kinetic_energy(body: BulletBody, whole: Character) -> float:
+def kinetic_energy(body: Body, whole: Character) -> float:
     """Kinetic energy of all links, J."""
     return sum(motion.kinetic_energy for motion in link_motions(body, whole))
 
 
-def momentum(body: BulletBody, whole: Character) -> tuple[FloatArray, FloatArray]:
+def momentum(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
     """Linear (N s) and angular momentum (N m s, about the world's origin) of all links."""
     motions = link_motions(body, whole)
     linear = sum(motion.mass * motion.velocity for motion in motions)

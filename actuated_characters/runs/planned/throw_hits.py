@@ -61,7 +61,8 @@ def find_hit(
     """
     settings = make_simulation_settings(plan.simulator)
     step = 1.0 / settings.rate_hz
-    with make_world(settings.world) as alone, make_world(WorldSettings(ground=False)) as world:
+    still = WorldSettings(engine=settings.world.engine, ground=False)
+    with make_world(settings.world) as alone, make_world(still) as world:
         both = BallAndCharacter(world, plan.character, in_order[ball].throw.radius)
         for number, (position, motion) in enumerate(states, start=1):
             for planned in in_order[len(alone.balls.throws) : len(motion)]:

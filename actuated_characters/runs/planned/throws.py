@@ -125,7 +125,15 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
         raise ConfigurationError(f"at is {request.at:g} s; it must be 0 s to less than {end:g} s")
     position = plan.reference.sample(request.at).configuration.position
     origin = _direction(plan.character, position, request.side)
-    impact = find_impact(plan.character, position, request.target, origin, size, request.distance)
+    impact = find_impact(
+        plan.character,
+        position,
+        request.target,
+        origin,
+        size,
+        request.distance,
+        engine=plan.simulation.world.engine,
+    )
     way = request.distance - float(fixed_order.dot(impact.centre - impact.target, origin))
     ticks = max(round(way / request.speed * rate), 1)
     first = round(request.at * rate) - ticks

@@ -8,7 +8,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.engine import World, make_world
+from sim_node.physics.engine import DEFAULT_ENGINE, World, make_world
 from sim_node.physics.settings import WorldSettings
 
 _TOUCHING_DISTANCE = 1e-6  # m: what is nearer counts as touching
@@ -55,6 +55,8 @@ def find_impact(
     origin: FloatArray,
     radius: float,
     distance: float,
+    *,
+    engine: str = DEFAULT_ENGINE,
 ) -> Impact:
     """Where a ball meets a link of a character that stands still.
 
@@ -65,6 +67,7 @@ def find_impact(
         origin: Unit vector (3,) from the link's centre of mass to where the ball comes from.
         radius: The ball's, m.
         distance: How far from the centre of mass it comes, m.
+        engine: The engine, whose shapes meet.
 
     Raises:
         ConfigurationError: the link does not exist, has no surface, or is in the ball already; or
@@ -72,7 +75,7 @@ def find_impact(
     """
     names = [one.name for one in character.links]
     row = _row(names, link, radius, distance)
-    with make_world(WorldSettings(ground=False)) as world:
+    with make_world(WorldSettings(engine=engine, ground=False)) as world:
         both = BallAndCharacter(world, character, radius)
         target = both.put_character(position)[row]
         gaps = both.put_ball(target + distance * origin)

@@ -7,7 +7,9 @@ its step and the places in which the links were right before it.
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -16,8 +18,9 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.bullet.body import BulletBody
 from sim_node.physics.bullet.world import BulletWorld
+from sim_node.physics.mujoco import world as mujoco_world
+from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.simulated_character import Contacts, SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
@@ -27,11 +30,19 @@ from tests.support.physics import (
     simulation,
 )
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 CROWD = {"characters": ["one", "other"], "other.placement": [0.25, 0.1, 0.0, 2.0]}
 
 
-def centres(body: BulletBody) -> dict[int, FloatArray]:
-    """Where the centres of mass of the engine's links are now."""
+def centres(body: Any) -> dict[int, FloatArray]:
+    """Where the centres of mass of the engine's links are now, by its numbers of them."""
+    if isinstance(body, MujocoBody):
+        model, data = body._world.model, mujoco.MjData(body._world.model)
+        data.qpos[:] = body._world.data.qpos
+        mujoco.mj_kinematics(model, data)
+        links = body.place.links
+        return {row: data.xipos[row].copy() for row in range(links.start, links.stop)}
     client, count = body._client, pybullet.getNumJoints(body._body, physicsClientId=body._client)
     base = pybullet.getBasePositionAndOrientation(body._body, physicsClientId=client)[0]
     found = {-1: np.array(base)}
@@ -43,8 +54,10 @@ def centres(body: BulletBody) -> dict[int, FloatArray]:
     return found
 
 
-def expected_wrenches(body: BulletBody, before: dict[int, FloatArray]) -> FloatArray:
+def expected_wrenches(body: Any, before: dict[int, FloatArray]) -> FloatArray:
     """Net wrenches (links, 6) of the engine's contact points, about where the links were before."""
+    if isinstance(body, MujocoBody):
+        return expected_of_mujoco(body, before)
     wrenches = np.zeros((len(before), 6))
     for point in pybullet.getContactPoints(physicsClientId=body._client):
         force = point[9] * np.array(point[7])
@@ -57,6 +70,21 @@ def expected_wrenches(body: BulletBody, before: dict[int, FloatArray]) -> FloatA
                 torque = np.cross(at - before[link], sign * force)
                 wrenches[body._row[link]] += np.concatenate((sign * force, torque))
     return wrenches
+
+
+def expected_of_mujoco(body: MujocoBody, before: dict[int, FloatArray]) -> FloatArray:
+    """By the forces of the solver's rows: of each contact one normal to the surfaces, two along."""
+    model, data = body._world.model, body._world.data
+    wrenches = {link: np.zeros(6) for link in before}
+    for contact in data.contact:
+        row = contact.efc_address
+        force = contact.frame.reshape(3, 3).T @ data.efc_force[row : row + 3]
+        for shape, sign in zip(contact.geom, (-1.0, 1.0), strict=True):
+            link = int(model.geom_bodyid[shape])
+            if row >= 0 and link in before:
+                torque = np.cross(contact.pos - before[link], sign * force)
+                wrenches[link] += np.concatenate((sign * force, torque))
+    return np.array([wrenches[link] for link in sorted(wrenches)])
 
 
 def read_at_once(run: Simulation, one: SimulatedCharacter) -> Contacts | None:
@@ -129,15 +157,18 @@ def test_of_several_characters_each_has_its_own_also_if_one_alone_is_read() -> N
     assert (felt > 1.0).all()
 
 
-def test_who_reads_none_looks_for_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_reads_none_looks_for_none(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     looked = []
-    find = BulletWorld._find_touched
+    owner, name = (
+        (BulletWorld, "_find_touched") if engine == "bullet" else (mujoco_world, "sum_contacts")
+    )
+    find = getattr(owner, name)
 
-    def counted(world: BulletWorld) -> object:
-        looked.append(world)
-        return find(world)
+    def counted(*arguments: Any) -> Any:
+        looked.append(arguments)
+        return find(*arguments)
 
-    monkeypatch.setattr(BulletWorld, "_find_touched", counted)
+    monkeypatch.setattr(owner, name, counted)
     with simulation("humanoid") as run:
         run.watches_contacts = True
         for _ in range(5):

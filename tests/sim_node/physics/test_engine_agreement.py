@@ -29,6 +29,8 @@ from tests.support.physics import (
     without_self_collision,
 )
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 STATES = 100
 ROUNDING = 1e-12
 """Of poses and energies of order one, which need no difference quotient."""

@@ -14,6 +14,8 @@ from msgs_config.messages.state import StampedState
 from sim_node.physics.probe import measure_probe
 from tests.support.hands import box_link, hand_on_a_body
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 STEP = 1.0 / 240.0
 GRAVITY = 9.81  # m/s^2
 LENGTH, MASS = 0.4, 0.5  # m, kg of each arm, which turns about its end

@@ -35,6 +35,8 @@ from tests.support.physics import (
     without_self_collision,
 )
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 PROPERTY = settings(deadline=None)
 HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout

@@ -14,6 +14,8 @@ from msgs_config.geometry import rotations
 from msgs_config.shared_parameters import placed
 from tests.support.physics import DATA, character, controller, link_poses, simulation, still_world
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 ELSEWHERE = [1.5, -2.0, 0.25, 0.7]
 FIXED = ["franka_panda", str(DATA / "turned_frames_fixed_y_up.yaml")]
 

@@ -21,6 +21,8 @@ from tests.support.physics import (
     touches,
 )
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 HUMANOID = character("humanoid")
 LAYOUT = HUMANOID.layout
 RATE_HZ, SECONDS = 240, 5

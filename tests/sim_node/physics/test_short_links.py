@@ -19,6 +19,8 @@ from sim_node.physics.short_links import short_joints, speed_bounds
 from tests.support.hands import box_link, hand_on_a_body, hinge
 from tests.support.physics import TURNED_FRAMES, character
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 STEP = 1.0 / 240.0
 LIMIT = 500.0  # rad/s or m/s, the default of `speed_limit`
 

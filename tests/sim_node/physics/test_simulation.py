@@ -11,6 +11,8 @@ from msgs_config.errors import ConfigurationError, LayoutError, SimulationError
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import LoneSimulation, character, momentum, simulation
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 HUMANOID = character("humanoid").layout
 LINKS = [link.name for link in character("humanoid").links]
 

@@ -15,6 +15,8 @@ from sim_node.physics.settings import STEADY_CONTACTS
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 TICKS = 36
 CASES: dict[str, tuple[str, dict[str, object], dict[str, object]]] = {
     # falls within the second, with soft limits and all kinds of contacts

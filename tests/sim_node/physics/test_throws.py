@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from msgs_config.errors import CommandError, ConfigurationError
 from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius, parse_throw
 from msgs_config.parameters import Values
 from sim_node.physics.balls.throws import MOST_BALLS, ThrowQueue
+from sim_node.physics.mujoco.world import MujocoWorld
 from sim_node.physics.settings import WorldSettings
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
@@ -27,6 +29,8 @@ from tests.support.physics import (
     momentum,
     simulation,
 )
+
+pytestmark = pytest.mark.usefixtures("engine")
 
 FREE_BOX = str(DATA / "free_box.yaml")
 RATE = 240
@@ -102,8 +106,10 @@ def walked(
 
 
 def _a_ball_touches(simulation: Simulation) -> bool:
-    touched = simulation._world.touched_links()
-    return any(number in touched for number in simulation._world.balls.numbers)
+    world: Any = simulation._world
+    if isinstance(world, MujocoWorld):
+        return any(world.contacts()[1][ball.place.links.start] for ball in world.balls.balls)
+    return any(number in world.touched_links() for number in world.balls.numbers)
 
 
 # Flight
@@ -190,7 +196,12 @@ def test_momentum_is_conserved_through_an_impact_on_a_humanoid() -> None:
     np.testing.assert_allclose(its + ball, (-16.0, 0.0, 0.0), atol=1e-6)
 
 
-def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str) -> None:
+# Restitution is 0, but for what brings surfaces apart again: the share of a speed that this leaves.
+# Bullet foresees a contact; MuJoCo finds it in each other by what a step goes, at the most.
+REBOUND = {"bullet": 0.016, "mujoco": 0.07}
+
+
+def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str, engine: str) -> None:
     throw = ProjectileThrow(2.0, 0.1, (3.0, 0.0, 0.1), (-6.0, 0.0, 0.0))
 
     with simulation(wall, **WEIGHTLESS) as run:
@@ -204,8 +215,7 @@ def test_the_impulse_on_what_cannot_move_is_all_that_the_ball_has(wall: str) -> 
             impulse += STEP * contacts.wrenches[0, :3]
         left = run.ball_motion()[0]
 
-    # restitution 0, but for what brings the surfaces apart again
-    assert 0.0 <= left[7] <= 0.1
+    assert 0.0 <= left[7] <= 6.0 * REBOUND[engine]
     np.testing.assert_allclose(impulse, (2.0 * (-6.0 - left[7]), 0.0, 0.0), atol=1e-9)
 
 

@@ -20,6 +20,8 @@ from tests.support.physics import (
     kinetic_energy,
 )
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 SIZE = character("humanoid").layout.size
 WELDED_BASE = """
   <link name="handle">
@@ -103,6 +105,7 @@ def test_two_worlds_at_once_do_not_disturb_each_other(threshold: float) -> None:
 # --- physics -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("engine", ["bullet"], indirect=True)
 def test_a_loaded_foot_trembles_only_where_contacts_lose_their_points() -> None:
     """A sole that keeps its corners does not tip to and fro from one tick to the next."""
 

@@ -12,6 +12,8 @@ from msgs_config.errors import CommandError
 from sim_node.physics.wrenches import WrenchQueue
 from tests.support.physics import FLOATING_TURNED_FRAMES, character
 
+pytestmark = pytest.mark.usefixtures("engine")
+
 PROPERTY = settings(max_examples=80, deadline=None)
 MOST_WAITING = 10_000
 

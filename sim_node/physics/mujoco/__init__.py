@@ -1,0 +1,1 @@
+"""The engine MuJoCo: the one place of the simulator that knows it."""

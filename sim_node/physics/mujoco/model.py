@@ -1,0 +1,180 @@
+"""MuJoCo's model of a world: the ground, characters and balls, and how contacts are solved.
+
+Each option has its reason in `docs/engines.md`. Which shapes may touch, and how, is as in Bullet's
+world: a link never touches those above it, and friction is the product of both surfaces'.
+"""
+
+import copy
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointType
+from msgs_config.character.model import Character, Joint, Link, Pose, Shape, ShapeType
+from msgs_config.character.mujoco_model import add_links, ancestors, compile_exactly, geometry
+from msgs_config.character.terrain import terrain_shapes
+from msgs_config.character.urdf.mimic import Mimic
+from msgs_config.errors import CharacterError
+from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.settings import WorldSettings
+
+_DISABLED_PARTS = ("AUTORESET", "SPRING", "DAMPER", "ACTUATION", "SENSOR", "FILTERPARENT")
+_MOST_KEPT_MODELS = 8  # compiled models, of which the same worlds are made again
+_LANDING = 2.0  # damping ratio of contacts and limits: what meets them hardly bounces
+_FRICTION_HARDNESS = (
+    10.0  # how much less than what carries friction yields: what stands creeps less
+)
+_LARGEST_IMPEDANCE = 0.95  # MuJoCo's own
+_GROUND_PRIORITY = 1  # MuJoCo takes the friction of the shape with the higher one
+
+_kept: OrderedDict[object, tuple[tuple[Character, ...], mujoco.MjModel]] = OrderedDict()
+
+
+def compile_world(
+    characters: Sequence[Character], balls: Sequence[ProjectileThrow], settings: WorldSettings
+) -> mujoco.MjModel:
+    """The model of a world: first the characters' links, then the balls, in their order.
+
+    Raises:
+        CharacterError: a file cannot be used, or MuJoCo refuses what it says.
+    """
+    # Characters are compared by identity, and kept with the model, so that none takes another's.
+    shapes = tuple((ball.mass, ball.radius) for ball in balls)
+    key = (*map(id, characters), shapes, replace(settings, gravity=0.0))
+    if key not in _kept:
+        _kept[key] = (tuple(characters), _compile(characters, balls, settings))
+        while len(_kept) > _MOST_KEPT_MODELS:
+            _kept.popitem(last=False)
+    _kept.move_to_end(key)
+    return copy.copy(_kept[key][1])
+
+
+def ball_link(number: int, throw: ProjectileThrow) -> Link:
+    """A ball as a body of one link: a solid sphere."""
+    inertia = 0.4 * throw.mass * throw.radius**2
+    shape = Shape(ShapeType.SPHERE, (throw.radius,))
+    joint = Joint(f"ball {number}", JointType.FLOATING)
+    return Link(f"ball {number}", -1, joint, throw.mass, (inertia,) * 3, Pose(), (), (shape,))
+
+
+def _compile(
+    characters: Sequence[Character], balls: Sequence[ProjectileThrow], settings: WorldSettings
+) -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False  # limits are in rad
+    _set_options(spec.option, settings)
+    _add_ground(spec, settings)
+    for number, character in enumerate(characters):
+        _add_character(spec, f"{number}/", character, settings)
+    ball_links = [ball_link(number, throw) for number, throw in enumerate(balls)]
+    for link in ball_links:
+        _add_body(spec, "", [link], settings)
+    links = [link for character in characters for link in character.links] + ball_links
+    try:
+        model = compile_exactly(spec, links)
+    except ValueError as error:
+        files = [str(each.file) for each in characters]
+        if settings.terrain is not None:
+            files.append(str(settings.terrain.urdf_path))
+        reason = str(error).strip().replace("\n", "; ")
+        raise CharacterError(f"{', '.join(files)}: not usable by MuJoCo: {reason}") from error
+    # The masses that contacts are scaled by are those of the links, not of the bodies compiled.
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    model.dof_simplenum[:] = 0
+    return model
+
+
+def _set_options(option: mujoco.MjOption, settings: WorldSettings) -> None:
+    option.timestep = settings.step_s
+    option.gravity = (0.0, 0.0, -settings.gravity)
+    option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.solver = mujoco.mjtSolver.mjSOL_PGS
+    option.iterations = settings.solver_iterations
+    option.tolerance = 0.0  # always the same number of iterations
+    option.impratio = _FRICTION_HARDNESS
+    # With this and islands, which are MuJoCo's default, a character's last bits do not depend on
+    # who else is in the world.
+    option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    option.disableflags = sum(
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _DISABLED_PARTS
+    )
+
+
+def _stiffness(settings: WorldSettings, damping_ratio: float = 1.0) -> tuple[float, float]:
+    """Time constant in s, the shortest that a step allows, and damping ratio of a constraint."""
+    return 2.0 * settings.step_s, damping_ratio
+
+
+def _joint_friction(settings: WorldSettings) -> tuple[float, float]:
+    """As of `_stiffness`, such that friction of joints stops them within a step, and no more."""
+    return 2.0 * settings.step_s / _LARGEST_IMPEDANCE, 1.0
+
+
+def _add_ground(spec: mujoco.MjSpec, settings: WorldSettings) -> None:
+    """Add the plane, and the terrain's shapes, which do not move."""
+    surface = _surface(settings, settings.friction * settings.link_friction)
+    surface["priority"] = _GROUND_PRIORITY
+    if settings.ground:
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), **surface)
+    if settings.terrain is not None:
+        for shape in terrain_shapes(settings.terrain):
+            spec.worldbody.add_geom(**geometry(spec, shape), **surface)
+
+
+def _surface(settings: WorldSettings, friction: float) -> dict[str, object]:
+    return {
+        "condim": 3,
+        "friction": (friction, 0.0, 0.0),
+        "solref": _stiffness(settings, _LANDING),
+    }
+
+
+def _add_character(
+    spec: mujoco.MjSpec, prefix: str, character: Character, settings: WorldSettings
+) -> None:
+    bodies = _add_body(spec, prefix, character.links, settings)
+    for index, other in combinations(range(len(bodies)), 2):
+        if not character.loading.self_collision or index in ancestors(character, other):
+            spec.add_exclude(bodyname1=bodies[index].name, bodyname2=bodies[other].name)
+    for joint in character.moving_joints:
+        if joint.mimic is not None:
+            spec.add_equality(
+                type=mujoco.mjtEq.mjEQ_JOINT,
+                objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                name1=prefix + joint.name,
+                name2=prefix + joint.mimic.leader,
+                data=_mimic(joint.mimic),
+                solref=_stiffness(settings),
+            )
+
+
+def _mimic(mimic: Mimic) -> FloatArray:
+    """A coupling as MuJoCo has it: a polynomial in the leader's position."""
+    data = np.zeros(mujoco.mjNEQDATA)
+    data[:2] = mimic.offset, mimic.multiplier
+    return data
+
+
+def _add_body(
+    spec: mujoco.MjSpec, prefix: str, links: Sequence[Link], settings: WorldSettings
+) -> list[mujoco.MjsBody]:
+    """Add links with their shapes and the limits of their joints."""
+    surface = _surface(settings, settings.link_friction * settings.link_friction)
+    bodies = add_links(spec, links, prefix)
+    for link, body in zip(links, bodies, strict=True):
+        for joint in body.joints:
+            joint.solref_friction = _joint_friction(settings)
+            if np.isfinite(link.joint.lower):
+                joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+                joint.range = (link.joint.lower, link.joint.upper)
+                joint.solref_limit = _stiffness(settings, _LANDING)
+        for shape in link.collision_shapes:
+            body.add_geom(**geometry(spec, shape), **surface)
+    return bodies
