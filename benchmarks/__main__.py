@@ -12,8 +12,7 @@ from msgs_config.errors import ConfigurationError  # noqa: E402 - after the limi
 from msgs_config.runtime.extras import require_extra  # noqa: E402
 
 try:
-    for extra in ("plan", "view"):
-        require_extra(extra, "make bench")
+    require_extra("view", "make bench")
 except ConfigurationError as error:
     sys.exit(f"error: {error}")
 

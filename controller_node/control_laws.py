@@ -192,8 +192,7 @@ def make_law(name: str, context: LawContext) -> Law:
 
 @_LAWS.register("stable_pd")
 def _stable_pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    context.model.update(tracking.position, tracking.velocity)
-    return _implicit(context, tracking, gains, 0.0)
+    return _implicit(context, tracking, gains)
 
 
 @_LAWS.register("computed_torque")
@@ -255,17 +254,35 @@ def _errors(context: LawContext, tracking: TrackingInput) -> tuple[FloatArray, F
 
 
 def _implicit(
-    context: LawContext, tracking: TrackingInput, gains: GainArrays, feedforward: FloatArray | float
+    context: LawContext,
+    tracking: TrackingInput,
+    gains: GainArrays,
+    feedforward: FloatArray | None = None,
 ) -> FloatArray:
+    """Stable PD with a feedforward (n,)."""
+    model, upcoming = context.model, tracking.upcoming
+    if not model.is_coupled:
+        return model.stable_pd(
+            tracking.position,
+            tracking.velocity,
+            upcoming.configuration.position,
+            upcoming.velocity,
+            gains.stiffness,
+            gains.damping,
+            context.period,
+            tracking.offset,
+            feedforward,
+        )
+    model.update(tracking.position, tracking.velocity)
     return stable_pd_effort(
-        context.model,
+        model,
         gains.stiffness,
         gains.damping,
-        tracking.next_error(context.model),
+        tracking.next_error(model),
         tracking.velocity,
-        tracking.upcoming.velocity,
+        upcoming.velocity,
         context.period,
-        feedforward,
+        0.0 if feedforward is None else feedforward,
     )
 
 
