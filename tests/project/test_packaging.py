@@ -40,7 +40,9 @@ def environment(prefix: Path, domain: int) -> dict[str, str]:
     given = {**os.environ, "AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": str(site_packages)}
     command = [sys.executable, "-c", "import sim_node.physics.soft_limits"]
     said = [
-        subprocess.run(command, env=given, check=True, capture_output=True, text=True).stderr
+        subprocess.run(
+            command, cwd=prefix, env=given, check=True, capture_output=True, text=True
+        ).stderr
         for _ in range(2)
     ]
     assert said == ["compiling what each tick computes, once; it takes some seconds\n", ""]
