@@ -19,10 +19,10 @@ from msgs_config.character.model import Character, Joint, SoftLimit
 from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.compiled import soft_limits
 from msgs_config.geometry import rotations
+from sim_node.physics.engine import make_world
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 from tests.support.hands import box_link, hinge
 from tests.support.physics import (
     character,
@@ -171,7 +171,7 @@ def test_a_limb_that_is_swung_against_its_limit_is_stopped_and_gains_no_energy(
     position[entries.start + axis] = limit.upper[axis] - 0.02
     velocity[entries.start + axis] = 4.0
     stored, energies, touched = [], [], 0
-    with World(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
+    with make_world(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
         body = world.add(without_self_collision("humanoid"))
         body.set_state(position, velocity)
         for tick in range(240):
@@ -387,7 +387,7 @@ def test_a_damper_far_too_strong_for_an_explicit_step_sinks_as_it_should() -> No
     # at d much larger than I / h gravity's torque moves it by m g r / d
     whole = damped(character("pendulum"), 1e4)
     passive = PassiveForces(whole, STEP, 9.81)
-    with World(WorldSettings(step_s=STEP)) as world:
+    with make_world(WorldSettings(step_s=STEP)) as world:
         body = world.add(whole)
         body.set_state(np.array([0.5]), np.array([3.0]))
         for _ in range(5):
