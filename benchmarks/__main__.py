@@ -21,6 +21,7 @@ from rich.console import Console  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
+from benchmarks.engines import measure_engines  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.planning import measure_planning  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
@@ -37,6 +38,7 @@ _MEASUREMENTS = {
     "laws": measure_control_laws,
     "search": measure_search,
     "cost": measure_cost,
+    "engines": measure_engines,
     "planning": measure_planning,
     "realtime": measure_realtime,
     "reconstruction": measure_reconstruction,

@@ -72,6 +72,11 @@ class ContactModel:
         self._limits = self._find_limits()
 
     @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model."""
+        return self._model
+
+    @property
     def feature_count(self) -> int:
         """Length f of a row of `write_features`."""
         return 2 * self._character.layout.size - 6 + 9 + 3 * len(self.end_effectors)
