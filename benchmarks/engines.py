@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -42,8 +43,12 @@ def _ours(character: Character) -> dict[str, Callable[[], object]]:
     for engine in ("bullet",):
         controller = ac.Controller(character, clip="walk")
         simulation = ac.Simulation(character, start=controller.start)
-        loops[engine] = lambda c=controller, s=simulation: s.step(c.compute_effort(s.state))
+        loops[engine] = partial(_tick, controller, simulation)
     return loops
+
+
+def _tick(controller: ac.Controller, simulation: ac.Simulation) -> None:
+    simulation.step(controller.compute_effort(simulation.state))
 
 
 def _peers(character: Character) -> dict[str, Callable[[], object]]:
