@@ -31,14 +31,15 @@ def test_the_engines_are_those_of_the_table() -> None:
     assert golden.engines() == expected, "another engine may have other bits: make hashes"
 
 
+@pytest.mark.parametrize("engine", golden.WORLDS)
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=marks_of(name)) for name in TABLE["runs"]],
 )
-def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> None:
-    summary = golden.summary_here(TABLE["runs"][name]["arguments"], tmp_path / "run")
+def test_a_golden_run_has_the_states_of_the_table(name: str, engine: str, tmp_path: Path) -> None:
+    summary = golden.summary_here(golden.arguments_of(name, engine), tmp_path / "run")
 
-    assert_as_in_the_table(name, summary)
+    assert_as_in_the_table(name, engine, summary)
 
 
 @pytest.mark.slow
@@ -46,15 +47,16 @@ def test_a_golden_run_has_the_states_of_the_table(name: str, tmp_path: Path) -> 
     "name",
     [OVER_TOPICS[0], *(pytest.param(name, marks=pytest.mark.nightly) for name in OVER_TOPICS[1:])],
 )
-def test_over_topics_it_has_them_too(name: str, domain: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", golden.WORLDS)
+def test_over_topics_it_has_them_too(name: str, engine: str, domain: int, tmp_path: Path) -> None:
     del domain
 
-    summary = golden.summary_over_topics(TABLE["runs"][name]["arguments"], tmp_path / "run")
+    summary = golden.summary_over_topics(golden.arguments_of(name, engine), tmp_path / "run")
 
-    assert_as_in_the_table(name, summary)
+    assert_as_in_the_table(name, engine, summary)
 
 
-def assert_as_in_the_table(name: str, summary: dict[str, object]) -> None:
-    wanted = {key: value for key, value in TABLE["runs"][name].items() if key != "arguments"}
+def assert_as_in_the_table(name: str, engine: str, summary: dict[str, object]) -> None:
+    wanted = TABLE["runs"][name][engine]
     found = {key: summary[key] for key in wanted}
     assert found == wanted, f"made with {TABLE['made_with']}, here {golden.made_with()}"

@@ -1,7 +1,8 @@
 """The golden runs: the states of each are the same, to the last bit, on every x86-64 with FMA.
 
-`data/state_hashes.json` has their arguments and hashes, and the engines that they belong to. A
-change that is meant to alter states renews the file, in a commit of its own that says why:
+`data/state_hashes.json` has their arguments, what each of the world's engines makes of them, and
+the versions that it holds for. A change that is meant to alter states renews the file, in a commit
+of its own that says why:
 
     make hashes
 """
@@ -26,6 +27,8 @@ from actuated_characters.runs.in_process import run_in_process
 
 FILE = Path(__file__).parents[1] / "data" / "state_hashes.json"
 ENGINES = ("pybullet", "mujoco-core")
+WORLDS = ("bullet", "mujoco")
+"""The engines of the world."""
 _KEPT = ("state_hash", "ticks", "joint_error_mean_rad", "root_error_mean_m", "fell")
 _THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -44,7 +47,7 @@ WHY_NOT = (
 
 
 def golden() -> dict[str, Any]:
-    """What the file says: `made_with` and `runs` by name."""
+    """What the file says: `made_with`, and `runs` by name: their arguments, and each engine's."""
     content: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
     return content
 
@@ -63,6 +66,11 @@ def made_with() -> dict[str, str]:
         "libc": " ".join(platform.libc_ver()),
         "flags": " ".join(sorted({"avx2", "avx512f", "fma"} & processor_flags())),
     }
+
+
+def arguments_of(name: str, engine: str) -> str:
+    """The arguments of a run in a world of an engine."""
+    return f"{golden()['runs'][name]['arguments']} --set sim_node.engine:={engine}"
 
 
 def summary_here(arguments: str, folder: Path) -> dict[str, Any]:
@@ -149,13 +157,14 @@ def renew(names: Sequence[str]) -> None:
     content = golden()
     runs, chosen = content["runs"], list(names) or list(content["runs"])
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as workers:
+        made = [(name, engine) for name in chosen for engine in WORLDS]
         summaries = workers.map(
-            lambda name: summary_apart(runs[name]["arguments"], Path(folder) / name), chosen
+            lambda run: summary_apart(arguments_of(*run), Path(folder) / "-".join(run)), made
         )
-        for name, summary in zip(chosen, summaries, strict=True):
-            old = runs[name]
-            runs[name] = {"arguments": old["arguments"], **{key: summary[key] for key in _KEPT}}
-            print(_told(name, old, runs[name]), flush=True)
+        for (name, engine), summary in zip(made, summaries, strict=True):
+            old = runs[name].get(engine, {})
+            runs[name][engine] = {key: summary[key] for key in _KEPT}
+            print(_told(f"{name}, {engine}", old, runs[name][engine]), flush=True)
     content["made_with"] = made_with()
     FILE.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
