@@ -58,9 +58,9 @@ class MujocoBody(Part):
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""
-        data, entries = self._world.data, self.place.velocities
+        data = self._world.data
         data.qpos[self.place.positions] = self._position_of(position)
-        data.qvel[entries], data.qacc_warmstart[entries] = velocity, 0.0
+        data.qvel[self.place.velocities] = velocity
         self._world.forget_frames()
 
     def set_motion(self, position: FloatArray, velocity: FloatArray) -> None:

@@ -23,8 +23,10 @@ from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.settings import WorldSettings
 
-_DISABLED_PARTS = ("AUTORESET", "SPRING", "DAMPER", "ACTUATION", "SENSOR", "FILTERPARENT")
+_UNUSED_PARTS = ("AUTORESET", "SPRING", "DAMPER", "ACTUATION", "SENSOR")
+_UNWANTED_PARTS = ("FILTERPARENT", "WARMSTART")
 _MOST_KEPT_MODELS = 8  # compiled models, of which the same worlds are made again
+_SWEEPS = 2  # of the solver for each iteration, because each step begins with no forces
 _LANDING = 2.0  # damping ratio of contacts and limits: what meets them hardly bounces
 _FRICTION_HARDNESS = (
     10.0  # how much less than what carries friction yields: what stands creeps less
@@ -95,14 +97,15 @@ def _set_options(option: mujoco.MjOption, settings: WorldSettings) -> None:
     option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.solver = mujoco.mjtSolver.mjSOL_PGS
-    option.iterations = settings.solver_iterations
+    option.iterations = _SWEEPS * settings.solver_iterations
     option.tolerance = 0.0  # always the same number of iterations
     option.impratio = _FRICTION_HARDNESS
-    # With this and islands, which are MuJoCo's default, a character's last bits do not depend on
-    # who else is in the world.
+    # With this, with islands, which are MuJoCo's default, and without a warm start, about which it
+    # decides for all together, no bit of a character depends on who else is in the world.
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     option.disableflags = sum(
-        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _DISABLED_PARTS
+        int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}"))
+        for part in _UNUSED_PARTS + _UNWANTED_PARTS
     )
 
 

@@ -45,17 +45,13 @@ class Part:
         self.is_placed = True
         return self.place
 
-    def state(self, data: mujoco.MjData) -> tuple[FloatArray, ...]:
-        """Its positions and velocities as MuJoCo has them, and what its solver starts from."""
-        entries = self.place.velocities
-        arrays = (data.qpos[self.place.positions], data.qvel[entries], data.qacc_warmstart[entries])
-        return tuple(array.copy() for array in arrays)
+    def state(self, data: mujoco.MjData) -> tuple[FloatArray, FloatArray]:
+        """Its positions and velocities as MuJoCo has them."""
+        return data.qpos[self.place.positions].copy(), data.qvel[self.place.velocities].copy()
 
     def restore(self, data: mujoco.MjData, state: Sequence[FloatArray]) -> None:
         """Restore a state of `state`."""
-        entries = self.place.velocities
-        data.qpos[self.place.positions] = state[0]
-        data.qvel[entries], data.qacc_warmstart[entries] = state[1:]
+        data.qpos[self.place.positions], data.qvel[self.place.velocities] = state
 
 
 NOTHING = Place(slice(0, 1), slice(0, 0), slice(0, 0))

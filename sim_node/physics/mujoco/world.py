@@ -2,8 +2,8 @@
 
 The model is compiled when something was added and the world is used again; what was there keeps its
 state. A step computes all that depends on the state in which it begins: frames, the mass matrix,
-contacts. So positions, velocities and what the solver starts from are the whole state, and the last
-step's contacts are there to be read until the next one.
+contacts. So positions and velocities are the whole state, and the last step's contacts are there to
+be read until the next one.
 """
 
 from collections.abc import Sequence
@@ -195,13 +195,13 @@ class MujocoWorld:
     def to_bytes(self) -> bytes:
         """The whole state, for any world of equal settings, characters and balls."""
         data = self.data
-        return b"".join(part.tobytes() for part in (data.qpos, data.qvel, data.qacc_warmstart))
+        return b"".join(part.tobytes() for part in (data.qpos, data.qvel))
 
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""
         self.balls.replace(throws)
         data, numbers = self.data, np.frombuffer(state)
-        for part in (data.qpos, data.qvel, data.qacc_warmstart):
+        for part in (data.qpos, data.qvel):
             part[:], numbers = numbers[: len(part)], numbers[len(part) :]
         data.qfrc_applied[:] = 0.0
         self.pushes.clear()

@@ -11,9 +11,11 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from controller_node.parameters import make_controller
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.settings import STEADY_CONTACTS
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
+from tests.support.physics import joint_simulation
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -136,3 +138,25 @@ def test_a_snapshot_has_what_a_reset_has_changed(plan: RunPlan, simulation: Simu
         assert advance(plan, other, TICKS).tobytes() == followed.tobytes()
         other.reset()
         assert advance(plan, other, TICKS).tobytes() == again.tobytes()
+
+
+CROWD = {
+    "characters": ["first", "second", "third"],
+    "character": "humanoid",
+    "first.placement": [0.0, -5.0, 0.0, 0.3],
+    "third.placement": [0.0, 5.0, 0.0, 0.0],
+}
+
+
+def test_where_a_character_goes_does_not_depend_on_who_else_is_in_the_world() -> None:
+    # all fall limply, and lie on the ground in the end; one is hit by a ball
+    ball = ProjectileThrow(3.0, 0.15, (2.0, 5.0, 1.0), (-8.0, 0.0, 0.0))
+    with joint_simulation({"character": "humanoid"}) as alone, joint_simulation(CROWD) as crowd:
+        (one,), (_, same, _) = alone.characters, crowd.characters
+        nothing = np.zeros(one.layout.size)
+        for tick in range(240):
+            alone.step([nothing])
+            crowd.step(3 * [nothing], throws=[ball] if tick == 30 else ())
+
+            assert one.state.position.tobytes() == same.state.position.tobytes(), tick
+            assert one.state.velocity.tobytes() == same.state.velocity.tobytes(), tick
