@@ -14,7 +14,7 @@ class WorldSettings(Settings):
 
     engine: str = parameter(
         DEFAULT_ENGINE,
-        "what simulates the world: bullet, if PyBullet is installed, or mujoco",
+        "what simulates the world; bullet is the default where PyBullet is installed",
         choices=tuple(ENGINES),
     )
     gravity: float = shared(GRAVITY)  # m/s^2, along -z
@@ -30,8 +30,8 @@ class WorldSettings(Settings):
     )
     contact_breaking_threshold: float = parameter(
         0.02,
-        "how far apart a contact's points may be until the engine drops them, as a share of the "
-        "smaller shape's size; with the engine's own, 0.02, a loaded foot trembles on its edges",
+        "engine bullet: how far apart a contact's points may be until they are dropped, as a share "
+        "of the smaller shape's size; with its own, 0.02, a loaded foot trembles on its edges",
         minimum=1e-3,
         maximum=1.0,
         at_reset=True,

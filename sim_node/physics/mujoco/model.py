@@ -23,8 +23,8 @@ from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.settings import WorldSettings
 
-_UNUSED_PARTS = ("AUTORESET", "SPRING", "DAMPER", "ACTUATION", "SENSOR")
-_UNWANTED_PARTS = ("FILTERPARENT", "WARMSTART")
+_UNWANTED_PARTS = ("AUTORESET", "FILTERPARENT", "WARMSTART")
+_UNUSED_PARTS = ("SPRING", "DAMPER", "ACTUATION", "SENSOR")
 _MOST_KEPT_MODELS = 8  # compiled models, of which the same worlds are made again
 _SWEEPS = 2  # of the solver for each iteration, because each step begins with no forces
 _LANDING = 2.0  # damping ratio of contacts and limits: what meets them hardly bounces
@@ -105,7 +105,7 @@ def _set_options(option: mujoco.MjOption, settings: WorldSettings) -> None:
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     option.disableflags = sum(
         int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}"))
-        for part in _UNUSED_PARTS + _UNWANTED_PARTS
+        for part in _UNWANTED_PARTS + _UNUSED_PARTS
     )
 
 

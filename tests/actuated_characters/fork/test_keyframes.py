@@ -32,6 +32,7 @@ EVERY = ("--set", "sim_node.keyframe_period:=0.5")
 WALK = ("--clip", "walk")
 PUSH = ("--push", "chest:0,100,0@0.3")
 QUICK = ("--planner", "predictive", "--set", "controller_node.plan.samples:=8")
+MUJOCO = ("--set", "sim_node.engine:=mujoco", "--set", "sim_node.substeps:=2")
 BALL = ("--throw", "mass=4 speed=8 at=0.5 target=chest")
 
 
@@ -47,6 +48,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "hit": (*WALK, *PUSH, *BALL, *of_controller("behaviour:=reactive")),
     "limp": (*WALK, "--push", "chest:0,900,0@0.2", *of_controller("behaviour:=active_ragdoll")),
     "machine": ("--machine", "walk", *PUSH, "--cmd-vel", "0.6,0,0.2@0.1"),
+    "other engine": (*WALK, *PUSH, *BALL, *of_controller("behaviour:=reactive"), *MUJOCO),
+    "other engine, limp": (*of_controller("behaviour:=ragdoll"), *WALK, *PUSH, *MUJOCO),
     "integral": ("--character", "pendulum", *of_controller("law:=pid", "gains.hinge.i:=50.0")),
     "balance": of_controller("balance.enabled:=true", "root_assistance:=false"),
     "steered": (*of_controller("reference:=steered"), "--cmd-vel", "0.6,0,0.2@0.1"),
