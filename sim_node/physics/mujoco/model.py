@@ -58,7 +58,7 @@ def compile_world(
 
 def ball_link(number: int, throw: ProjectileThrow) -> Link:
     """A ball as a body of one link: a solid sphere."""
-    inertia = 0.4 * throw.mass * throw.radius**2
+    inertia = 0.4 * throw.mass * throw.radius * throw.radius
     shape = Shape(ShapeType.SPHERE, (throw.radius,))
     joint = Joint(f"ball {number}", JointType.FLOATING)
     return Link(f"ball {number}", -1, joint, throw.mass, (inertia,) * 3, Pose(), (), (shape,))
