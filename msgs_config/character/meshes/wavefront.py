@@ -34,7 +34,7 @@ def read_wavefront(path: Path) -> WavefrontMesh:
     try:
         status = path.stat()
         return _read_version(path, status.st_mtime_ns, status.st_size)
-    except (OSError, ValueError) as error:
+    except (OSError, OverflowError, ValueError) as error:
         raise CharacterError(f"mesh {path} cannot be used: {str(error)[:200]}") from error
 
 
