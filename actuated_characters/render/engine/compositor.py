@@ -63,6 +63,8 @@ class Compositor:
 
         That is what is seen from the light.
         """
+        if not len(casting.radii):
+            return
         light = framing(casting, 1.0, LIGHT_VIEW)
         width, height = _SHADOW_SIZE
         dark = scene.draw(light, _SHADOW_SIZE, PixelRegion(0, height, 0, width)).casts_shadow

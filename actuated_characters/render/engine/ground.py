@@ -35,7 +35,7 @@ def depths(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
     _, up, back = view.axes()
     falls = float(back[2]) - view.pixel(height) * (0.5 * height - rows) * float(up[2])
     eye = float(view.eye()[2])
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         depth: FloatArray = np.where((falls > 0.0) & (eye > 0.0), eye / falls, np.inf)
     return depth
 

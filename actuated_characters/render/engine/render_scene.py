@@ -19,7 +19,6 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.geometry import fixed_order, rotations
-from msgs_config.geometry.surface import Surface
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
@@ -28,7 +27,6 @@ _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
 _BALL_COLOR = (0.25, 0.25, 0.28, 1.0)
 _SEEN, _CASTS_SHADOW = 1, 2  # marks of samples in which there is something
-_UPRIGHT = np.array(rotations.IDENTITY_XYZW)
 
 
 class Drawing(NamedTuple):
@@ -45,9 +43,28 @@ class _Body(NamedTuple):
     skin: TexturedSurface
     color: Quadruple
     origin: FloatArray  # (3,), m, world
-    turn_xyzw: FloatArray  # (4,)
+    axes: FloatArray  # (3, 3): its own as columns, in the world, of length one or scaled
     mark: int
-    scale: float = 1.0
+
+
+class _Skins(NamedTuple):
+    """The surfaces of shapes in their own frames, and where these are in others."""
+
+    surfaces: list[TexturedSurface]
+    colors: list[Quadruple]
+    origins: FloatArray  # (b, 3), m
+    axes: FloatArray  # (b, 3, 3), as columns
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape]) -> "_Skins":
+        poses = [shape.pose for shape in shapes]
+        turns_xyzw = np.array([pose.orientation_xyzw for pose in poses]).reshape(-1, 4)
+        return cls(
+            [textured_surface_of(shape) for shape in shapes],
+            [shape.color_rgba for shape in shapes],
+            np.array([pose.position for pose in poses]).reshape(-1, 3),
+            rotations.matrix(turns_xyzw),
+        )
 
 
 class RenderScene:
@@ -61,12 +78,9 @@ class RenderScene:
         Raises:
             CharacterError: a mesh cannot be used, or the terrain's URDF.
         """
-        self._links = [
-            (row, _in_link(shape), shape.color_rgba)
-            for row, shapes in enumerate(links)
-            for shape in shapes
-        ]
-        self._terrain = [] if terrain is None else [*map(_in_link, terrain_shapes(terrain))]
+        self._links = _Skins.of([shape for shapes in links for shape in shapes])
+        self._rows = np.repeat(np.arange(len(links)), [len(shapes) for shapes in links])
+        self._terrain = _Skins.of([] if terrain is None else terrain_shapes(terrain))
         self._ball = textured_surface_of(Shape(ShapeType.SPHERE, (1.0,)))
         self._shown: list[_Body] = []
 
@@ -76,29 +90,34 @@ class RenderScene:
 
     def show_links(self, frames: Frames, colors: Sequence[Quadruple | None]) -> None:
         """Show the links where their frames are, NaN hides one; None is a link's own colour."""
-        for row, skin, own_color in self._links:
-            origin, turn_xyzw = frames[0][row], frames[1][row]
-            color = colors[row] or own_color
-            self._shown.append(_Body(skin, color, origin, turn_xyzw, _CASTS_SHADOW))
+        skins, (origins, turns_xyzw) = self._links, frames
+        turns = rotations.matrix(turns_xyzw[self._rows])
+        places = origins[self._rows] + fixed_order.apply(turns, skins.origins)
+        axes = fixed_order.product(turns, skins.axes)
+        for number, row in enumerate(self._rows.tolist()):
+            color = colors[row] or skins.colors[number]
+            skin, place = skins.surfaces[number], places[number]
+            self._shown.append(_Body(skin, color, place, axes[number], _CASTS_SHADOW))
 
     def show_terrain(self) -> None:
         """Show the terrain, if there is one."""
-        for skin in self._terrain:
-            self._shown.append(_Body(skin, _TERRAIN_COLOR, np.zeros(3), _UPRIGHT, _SEEN))
+        skins = self._terrain
+        for skin, origin, axes in zip(skins.surfaces, skins.origins, skins.axes, strict=True):
+            self._shown.append(_Body(skin, _TERRAIN_COLOR, origin, axes, _SEEN))
 
     def show_balls(self, balls: FloatArray) -> None:
         """Show balls, of which centres and radii (m, 4) are given in m."""
         for ball in balls:
-            body = _Body(self._ball, _BALL_COLOR, ball[:3], _UPRIGHT, _CASTS_SHADOW, float(ball[3]))
-            self._shown.append(body)
+            axes = ball[3] * np.eye(3)
+            self._shown.append(_Body(self._ball, _BALL_COLOR, ball[:3], axes, _CASTS_SHADOW))
 
     def show_arrows(self, arrows: Iterable[FloatArray], radius: float) -> None:
         """Show arrows, none of length zero: tail and tip (2, 3); their shafts' radius; m."""
         for tail, tip in arrows:
             surface = arrow_surface(float(fixed_order.norm(tip - tail)), radius)
             skin = TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)
-            turn_xyzw = rotations.from_z(tip - tail)
-            self._shown.append(_Body(skin, _ARROW_COLOR, tail, turn_xyzw, _SEEN))
+            axes = rotations.matrix(rotations.from_z(tip - tail))
+            self._shown.append(_Body(skin, _ARROW_COLOR, tail, axes, _SEEN))
 
     def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
@@ -109,17 +128,20 @@ class RenderScene:
         marks = np.zeros(shape, dtype=np.uint8)
         middle = (0.5 * width - box.left, 0.5 * height - box.top)
         lens = np.array((1.0 / view.pixel(height), *middle, _NEAR_PLANE * view.distance))
-        axes, eye, light = view.axes(), view.eye(), LIGHT_VIEW.axes()[2]
-        for body in self._shown:
-            turn = rotations.matrix(body.turn_xyzw)
+        origins = np.array([body.origin for body in self._shown]).reshape(-1, 3)
+        turns = np.array([body.axes for body in self._shown]).reshape(-1, 3, 3)
+        seen_axes = fixed_order.product(view.axes(), turns)
+        seen_origins = fixed_order.apply(view.axes(), origins - view.eye())
+        lights = fixed_order.apply(turns.swapaxes(-1, -2), LIGHT_VIEW.axes()[2])
+        for number, body in enumerate(self._shown):
             rasteriser.draw_triangles(
                 *body.skin.surface,
                 body.skin.uvs,
                 body.skin.texture,
                 255.0 * np.array(body.color[:3]),
-                body.scale * fixed_order.product(axes, turn),
-                fixed_order.apply(axes, body.origin - eye),
-                fixed_order.apply(turn.T, light),
+                seen_axes[number],
+                seen_origins[number],
+                lights[number] / fixed_order.norm(lights[number]),
                 lens,
                 body.mark,
                 color,
@@ -129,15 +151,3 @@ class RenderScene:
         with np.errstate(divide="ignore"):
             depth: Samples = np.float32(1.0) / inverses
         return Drawing(color, depth, marks == _CASTS_SHADOW)
-
-
-def _in_link(shape: Shape) -> TexturedSurface:
-    """A shape's surface, in the frame of its link."""
-    (vertices, normals, triangles), uvs, texture = textured_surface_of(shape)
-    turn, position = np.array(shape.pose.orientation_xyzw), np.array(shape.pose.position)
-    surface = Surface(
-        np.ascontiguousarray(rotations.rotate(turn, vertices) + position),
-        np.ascontiguousarray(rotations.rotate(turn, normals)),
-        np.ascontiguousarray(triangles),
-    )
-    return TexturedSurface(surface, np.ascontiguousarray(uvs), np.ascontiguousarray(texture))

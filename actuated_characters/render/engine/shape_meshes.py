@@ -112,9 +112,11 @@ def _shared(corners: IntArray) -> tuple[IntArray, IntArray]:
 
 def _scaled(surface: Surface, scale: FloatArray) -> Surface:
     """A surface stretched along its axes; a mirror turns triangles inside out, so they turn."""
+    if (scale == 1.0).all():
+        return surface
     normals = surface.normals / np.where(scale == 0.0, 1.0, scale)
     normals /= fixed_order.norm(normals)[:, np.newaxis]
-    triangles = surface.triangles[:, ::-1] if np.prod(scale) < 0.0 else surface.triangles
+    triangles = surface.triangles[:, ::-1].copy() if np.prod(scale) < 0.0 else surface.triangles
     return Surface(surface.vertices * scale, normals, triangles)
 
 

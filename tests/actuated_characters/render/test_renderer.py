@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 from math import cos, pi, sin, tan
 from pathlib import Path
 
@@ -387,3 +388,47 @@ def test_pictures_need_no_engine() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
 
     assert (done.stdout.strip(), done.returncode) == ("[]", 0), done.stderr
+
+
+def test_a_character_that_is_nowhere_leaves_the_ground_as_it_is(box: Character) -> None:
+    size, nowhere = (64, 48), STILL * np.nan
+    above = CameraPose((0.0, 0.0, 0.5), distance=4.0)
+
+    picture = take_picture(Renderer(box), nowhere, ghost=nowhere, view=above, size=size)
+
+    far_away = take_picture(Renderer(box), at(z=1e4), view=above, size=size)
+    np.testing.assert_array_equal(picture, far_away)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 300), (300, 1), (17, 31)])
+def test_a_picture_has_any_size(box: Character, size: tuple[int, int]) -> None:
+    picture = take_picture(Renderer(box), at(z=0.4), ghost=at(x=0.3), view=UPRIGHT, size=size)
+
+    assert picture.shape == (size[1], size[0], 3)
+
+
+def test_half_a_million_triangles_are_drawn_in_a_second(tmp_path: Path) -> None:
+    side = np.linspace(-1.0, 1.0, 501)
+    x, y = np.meshgrid(side, side)
+    vertices = np.column_stack((x.ravel(), np.sin(9.0 * x * y).ravel(), y.ravel()))
+    row, column = np.mgrid[:500, :500].reshape(2, -1)
+    first = 501 * row + column
+    halves = [(first, first + 1, first + 502), (first, first + 502, first + 501)]
+    corners = vertices[np.concatenate([np.column_stack(half) for half in halves])]
+    stl = np.zeros(len(corners), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("", "<u2")])
+    stl["corners"] = corners
+    (tmp_path / "waves.stl").write_bytes(bytes(80) + len(stl).to_bytes(4, "little") + stl.tobytes())
+    path = tmp_path / "waves.urdf"
+    path.write_text(
+        '<robot name="waves"><link name="waves"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial><visual><geometry>'
+        '<mesh filename="waves.stl"/></geometry></visual></link></robot>'
+    )
+    camera = Renderer(load_character(str(path)), ground=False)
+    take_picture(camera, STILL, view=UPRIGHT, size=SIZE)  # compiled by now
+
+    start = time.process_time()
+    picture = take_picture(camera, STILL, view=UPRIGHT, size=SIZE)
+
+    assert time.process_time() - start < 1.0
+    assert seen(picture).mean() > 0.3
