@@ -11,9 +11,10 @@ from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf.frames import joint_end
 from msgs_config.character.urdf.origin import read_numbers, read_origin
 from msgs_config.character.urdf.repair import repair_urdf
+from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
-_PLANE_EDGES = (1000.0, 1000.0, 0.01)  # m: stands for a plane, whose upper side is this box's
+_PLANE_EDGES = (1000.0, 1000.0, 10.0)  # m: stands for a plane, whose upper side is this box's
 
 
 def terrain_shapes(loading: UrdfOptions) -> list[Shape]:
@@ -23,6 +24,8 @@ def terrain_shapes(loading: UrdfOptions) -> list[Shape]:
         CharacterError: the URDF or a mesh of it cannot be used; names the file.
     """
     robot = resolve_meshes(loading).robot
+    if robot.find("link") is None:
+        raise CharacterError(f"{loading.urdf_path}: not a usable URDF: it has no link")
     repair_urdf(robot, loading)
     frames = _link_frames(robot)
     planes = _take_planes(robot)
