@@ -47,13 +47,17 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 """
 
 
+@pytest.mark.parametrize("engine", golden.WORLDS)
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
-def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -> None:
-    summary = golden.summary_apart(TABLE[name]["arguments"], tmp_path / "run", before=POISON)
+def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_path: Path) -> None:
+    arguments = golden.arguments_of(name, engine)
 
-    assert summary["state_hash"] == TABLE[name]["state_hash"]
+    summary = golden.summary_apart(arguments, tmp_path / "run", before=POISON)
+
+    assert summary["state_hash"] == TABLE[name][engine]["state_hash"]
 
 
+@pytest.mark.parametrize("engine", golden.WORLDS)
 @pytest.mark.parametrize(
     "environment",
     [
@@ -67,9 +71,11 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, tmp_path: Path) -
     ],
     ids=lambda environment: "-".join(environment.values()).replace(" ", "-"),
 )
-def test_the_processors_kernels_do_not_matter(environment: dict[str, str], tmp_path: Path) -> None:
-    run = TABLE[SENSITIVE]
+def test_the_processors_kernels_do_not_matter(
+    environment: dict[str, str], engine: str, tmp_path: Path
+) -> None:
+    arguments = golden.arguments_of(SENSITIVE, engine)
 
-    summary = golden.summary_apart(run["arguments"], tmp_path / "run", environment=environment)
+    summary = golden.summary_apart(arguments, tmp_path / "run", environment=environment)
 
-    assert summary["state_hash"] == run["state_hash"]
+    assert summary["state_hash"] == TABLE[SENSITIVE][engine]["state_hash"]

@@ -1,10 +1,11 @@
-"""Fixtures of the tests of the simulator's node."""
+"""Fixtures of the tests of the simulator: its engines, and clients of its node."""
 
 from collections.abc import Callable, Iterator
 
 import pytest
 from rclpy.context import Context
 
+from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
 from tests.support.ros import SimulatorClient
 
 Join = Callable[..., SimulatorClient]
@@ -22,3 +23,10 @@ def join(context: Context) -> Iterator[Join]:
     yield make
     for client in clients:
         client.close()
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Each engine in turn, which all worlds of the test are simulated by unless it says which."""
+    monkeypatch.setitem(ENGINES, DEFAULT_ENGINE, ENGINES[request.param])
+    return str(request.param)

@@ -157,7 +157,7 @@ def renew(names: Sequence[str]) -> None:
     content = golden()
     runs, chosen = content["runs"], list(names) or list(content["runs"])
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as workers:
-        made = [(name, engine) for name in chosen for engine in WORLDS]
+        made = [(name, engine) for name in chosen for engine in WORLDS if engine in runs[name]]
         summaries = workers.map(
             lambda run: summary_apart(arguments_of(*run), Path(folder) / "-".join(run)), made
         )

@@ -9,17 +9,20 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
+from msgs_config.character.meshes.parts import read_parts
 from msgs_config.character.model import Character, Joint, Link, Pose, Shape, ShapeType
 from msgs_config.character.mujoco_model import add_links, ancestors, compile_exactly, geometry
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.errors import CharacterError
+from msgs_config.geometry import rotations
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.settings import WorldSettings
 
@@ -128,7 +131,7 @@ def _add_ground(spec: mujoco.MjSpec, settings: WorldSettings) -> None:
         spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), **surface)
     if settings.terrain is not None:
         for shape in terrain_shapes(settings.terrain):
-            spec.worldbody.add_geom(**geometry(spec, shape), **surface)
+            _add_shape(spec, spec.worldbody, shape, surface)
 
 
 def _surface(settings: WorldSettings, friction: float) -> dict[str, object]:
@@ -179,5 +182,21 @@ def _add_body(
                 joint.range = (link.joint.lower, link.joint.upper)
                 joint.solref_limit = _stiffness(settings, _LANDING)
         for shape in link.collision_shapes:
-            body.add_geom(**geometry(spec, shape), **surface)
+            _add_shape(spec, body, shape, surface)
     return bodies
+
+
+def _add_shape(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, shape: Shape, surface: dict[str, object]
+) -> None:
+    """Add a shape, of a mesh the hulls of its parts."""
+    if shape.type is not ShapeType.MESH:
+        body.add_geom(**geometry(spec, shape), **surface)
+        return
+    turn = rotations.wxyz_from_xyzw(np.array(shape.pose.orientation_xyzw))
+    for vertices in read_parts(Path(shape.mesh)):
+        mesh = spec.add_mesh(name=f"mesh {len(spec.meshes)}", scale=shape.size)
+        mesh.uservert = vertices.ravel()
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # also of what has no volume
+        place = {"pos": shape.pose.position, "quat": turn, "meshname": mesh.name}
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, **place, **surface)
