@@ -13,7 +13,8 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
-from msgs_config.geometry import fixed_order, rotations, scalars
+from msgs_config.compiled.message_form import read_motion
+from msgs_config.geometry import fixed_order, rotations
 from sim_node.physics.mujoco.part import Part
 
 if TYPE_CHECKING:
@@ -30,31 +31,29 @@ class MujocoBody(Part):
         super().__init__(character.links)
         self._world, self.character, self.speed_bound = world, character, speed_bound
         self._has_friction = any(joint.friction for joint in character.moving_joints)
-        self._is_quaternion: list[bool] = []  # of each group of numbers of a position
         self._identity: list[float] = []  # MuJoCo's position that is no position at all
+        quaternions: list[int] = []  # see `read_motion`
+        vectors: list[int] = []
+        numbers: list[int] = []
+        entries: list[int] = []
         for joint in self._layout.joints:
-            if joint.type is JointType.FLOATING:
-                self._is_quaternion += [False, False, False, True]
-                self._identity += [0.0, 0.0, 0.0, *_NO_TURN_WXYZ]
-            elif joint.type is JointType.SPHERICAL:
-                self._is_quaternion.append(True)
+            if joint.type is not JointType.SPHERICAL:
+                count = 3 if joint.type is JointType.FLOATING else 1
+                numbers += range(len(self._identity), len(self._identity) + count)
+                entries += range(joint.start, joint.start + count)
+                self._identity += count * [0.0]
+            if joint.rotation is not None:
+                quaternions.append(len(self._identity))
+                vectors.append(joint.rotation.start)
                 self._identity += _NO_TURN_WXYZ
-            else:
-                self._is_quaternion.append(False)
-                self._identity.append(0.0)
+        self._places = [
+            np.array(places, dtype=np.intp) for places in (quaternions, vectors, numbers, entries)
+        ]
 
     def read(self) -> FloatArray:
         """Position and velocity, (2, n)."""
-        data = self._world.data
-        numbers = iter(data.qpos[self.place.positions].tolist())
-        position: list[float] = []
-        for is_quaternion in self._is_quaternion:
-            number = next(numbers)
-            if is_quaternion:
-                position += scalars.log((next(numbers), next(numbers), next(numbers), number))
-            else:
-                position.append(number)
-        return np.array((position, data.qvel[self.place.velocities]))
+        data, place = self._world.data, self.place
+        return read_motion(data.qpos[place.positions], data.qvel[place.velocities], *self._places)
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""

@@ -6,7 +6,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray
 
 _SLOWING = 0.1  # times as fast as what is normal to a surface
-_DAMPING = 1  # the column of a constraint's reference that multiplies its velocity
+_NUMBERS, _DAMPING = 4, 1  # of a constraint's reference, and the one that is times its velocity
 _FORCE_NUMBERS = 6  # of one contact, in its own frame: a force and a torque
 
 
@@ -19,12 +19,11 @@ def soften_friction(data: mujoco.MjData) -> None:
     MuJoCo's own setting of that (`solreffriction`) is for pairs of shapes that are listed one by
     one. To be called after `mj_fwdPosition`.
     """
-    rows = data.contact.efc_address
-    rows = rows[rows >= 0]  # contacts without any are between what cannot move
-    if len(rows):
-        reference = data.efc_KBIP.reshape(-1, 4)
-        reference[rows + 1, _DAMPING] *= _SLOWING
-        reference[rows + 2, _DAMPING] *= _SLOWING
+    before = data.ne + data.nf + data.nl  # rows of couplings, friction and limits
+    if data.nefc > before:
+        # of each contact twelve numbers: four of what is normal to it, and of each way along it
+        contacts = data.efc_KBIP[before:].reshape(-1, 3 * _NUMBERS)
+        contacts[:, _NUMBERS + _DAMPING :: _NUMBERS] *= _SLOWING
 
 
 def sum_contacts(

@@ -142,3 +142,17 @@ def test_on_a_slope_a_box_slides_or_stays_by_its_friction(
     assert axes[:, 0] @ velocity[:3] == pytest.approx(slides, abs=0.02)
     # the surface that a ray from above meets is the slope
     assert below == pytest.approx(-np.tan(SLOPE) * position[0], abs=1e-3)
+
+
+def test_what_slides_stays_on_the_ground(box: Character) -> None:
+    with LoneWorld(box, WorldSettings(friction=0.5, link_friction=1.0)) as world:
+        world.body.set_state(np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), np.zeros(6))
+        advance(world, np.zeros(6), 120)
+        start, _ = world.body.read()
+        world.body.set_state(start, np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        heights = []
+        for _ in range(60):
+            advance(world, np.zeros(6))
+            heights.append(world.body.read()[0][2])
+
+    assert max(heights) < 0.1 + 1e-3
