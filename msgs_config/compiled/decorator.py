@@ -80,7 +80,7 @@ def _make_directory(directory: Path) -> bool:
 
 @cache
 def _say_what_takes_long() -> None:
-    print("compiling what each tick computes, once; it takes some seconds", file=sys.stderr)
+    print("compiling what is computed often, once; it takes some seconds", file=sys.stderr)
 
 
 def choose_cache_directory(sources: Iterable[Path], given: str = "") -> Path:

@@ -45,7 +45,7 @@ def environment(prefix: Path, domain: int) -> dict[str, str]:
         ).stderr
         for _ in range(2)
     ]
-    assert said == ["compiling what each tick computes, once; it takes some seconds\n", ""]
+    assert said == ["compiling what is computed often, once; it takes some seconds\n", ""]
     return given
 
 

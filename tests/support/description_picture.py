@@ -107,12 +107,19 @@ def _take(client: Engine, view: CameraPose, size: Size) -> tuple[Picture, BoolAr
     right_up_back = view.axes()
     eye = np.array(view.target) + view.distance * right_up_back[2]
     width, height = size
+    near = 0.1
+    step = view.pixel(height) * near
     _, _, rgba, _, seen = pybullet.getCameraImage(
         width,
         height,
         pybullet.computeViewMatrix(eye.tolist(), view.target, right_up_back[1].tolist()),
-        pybullet.computeProjectionMatrixFOV(
-            float(np.degrees(view.field_of_view)), width / height, 0.1, 100.0
+        pybullet.computeProjectionMatrix(  # PyBullet's samples are in the corners of pixels
+            step * (0.5 - 0.5 * width),
+            step * (0.5 + 0.5 * width),
+            step * (0.5 - 0.5 * height),
+            step * (0.5 + 0.5 * height),
+            near,
+            100.0,
         ),
         shadow=False,
         renderer=pybullet.ER_TINY_RENDERER,

@@ -103,7 +103,7 @@ def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
 
 
 def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
-    """Without those of no size, which the engine refuses and no picture shows."""
+    """Without those of no size, which no picture shows."""
     return [shape for shape in shapes if shape.type is ShapeType.MESH or min(shape.size) > 0.0]
 
 

@@ -8,6 +8,7 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from PIL import Image
 
+from actuated_characters.render.engine import rasteriser
 from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.posed_characters import LinkForce
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
@@ -59,3 +60,11 @@ def test_a_scene_looks_as_another_renderer_draws_it(name: str) -> None:
 
 def test_a_picture_has_the_same_bits_everywhere() -> None:
     assert sha256(take("humanoid").tobytes()).hexdigest() == HASH
+
+
+def test_whatever_is_drawn_is_compiled_once() -> None:
+    for name in SCENES:
+        take(name)
+
+    for function in (rasteriser.draw_triangles, rasteriser.add_shadow):
+        assert len(function.signatures) == 1
