@@ -24,6 +24,7 @@ from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.messages.throw import ProjectileThrow
+from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.settings import WorldSettings
 
 _UNWANTED_PARTS = ("AUTORESET", "FILTERPARENT", "WARMSTART")
@@ -37,6 +38,7 @@ _FRICTION_HARDNESS = (
 _LARGEST_IMPEDANCE = 0.95  # MuJoCo's own
 _GROUND_PRIORITY = 1  # MuJoCo takes the friction of the shape with the higher one
 
+_keeping = fork_safe_lock()  # worlds may be made in several threads
 _kept: OrderedDict[object, tuple[tuple[Character, ...], mujoco.MjModel]] = OrderedDict()
 
 
@@ -51,12 +53,13 @@ def compile_world(
     # Characters are compared by identity, and kept with the model, so that none takes another's.
     shapes = tuple((ball.mass, ball.radius) for ball in balls)
     key = (*map(id, characters), shapes, replace(settings, gravity=0.0))
-    if key not in _kept:
-        _kept[key] = (tuple(characters), _compile(characters, balls, settings))
-        while len(_kept) > _MOST_KEPT_MODELS:
-            _kept.popitem(last=False)
-    _kept.move_to_end(key)
-    return copy.copy(_kept[key][1])
+    with _keeping:
+        if key not in _kept:
+            _kept[key] = (tuple(characters), _compile(characters, balls, settings))
+            while len(_kept) > _MOST_KEPT_MODELS:
+                _kept.popitem(last=False)
+        _kept.move_to_end(key)
+        return copy.copy(_kept[key][1])
 
 
 def ball_link(number: int, throw: ProjectileThrow) -> Link:
