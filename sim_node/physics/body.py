@@ -18,6 +18,7 @@ from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
 from sim_node.physics.joint_constraints import couple_joints, set_friction
+from sim_node.physics.loaded_links import check_links
 from sim_node.physics.touches import TouchedLinks, net_wrenches
 
 _QUATERNION = 4  # numbers of a ball joint's position in the engine
@@ -44,7 +45,7 @@ class Body:
         freedom.
 
         Raises:
-            CharacterError: the engine refuses the URDF or a mesh.
+            CharacterError: the engine refuses the URDF or a mesh, or reads a link otherwise.
         """
         self._client = client
         self._layout = character.layout
@@ -84,6 +85,7 @@ class Body:
         numbers = {info[1].decode(): info[0] for info in infos}
         # the engine's number of each link; -1 is the base
         self._numbers = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
+        check_links(self._client, self._body, self._numbers, character)
         self._row = {number: row for row, number in enumerate(self._numbers)}
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
         self._joints = [numbers[joint.name] for joint in joints]
