@@ -32,7 +32,7 @@ demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/d
 	$(BIN)/actuated_characters run --character humanoid --clip walk --duration 20 --output runs/demo --overwrite
 	@echo "to watch it: make play (live, in the browser), or $(BIN)/actuated_characters view runs/demo (this run; needs the extra 'view')"
 
-backflip: .venv/.installed-plan ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip
+backflip: .venv/.installed ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip
 	$(BIN)/actuated_characters run --clip backflip --duration 1.75 --planner predictive --output runs/backflip --overwrite
 
 play: .venv/.installed-view ## Let a humanoid walk in the browser, to be pushed and pelted with balls; in runs/play-walker
@@ -123,21 +123,20 @@ distclean: clean ## Remove .venv too
 .venv/.installed: $(PACKAGING) | .venv/.created
 	@echo "installing the package into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@$(BIN)/python -c '$(COMPILE)'
 	@touch $@
-
-.venv/.installed-plan: $(PACKAGING) | .venv/.created
-	@echo "installing the package and what the planner needs into .venv ..."
-	@$(BIN)/python -m pip install -qq -e '.[wheels,plan]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@touch .venv/.installed $@
 
 .venv/.installed-view: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its viewer into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels,view]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+	@$(BIN)/python -c '$(COMPILE)'
 	@touch .venv/.installed $@
 
 .venv/.installed-test: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its test tools into .venv ..."
 	@$(BIN)/python -m pip install -qq -e '.[wheels,test]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@touch .venv/.installed .venv/.installed-plan .venv/.installed-view $@  # it has their extras, too
+	@$(BIN)/python -c '$(COMPILE)'
+	@touch .venv/.installed .venv/.installed-view $@  # it has their extras, too
 
+COMPILE := import sim_node.physics.soft_limits
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

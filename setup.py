@@ -52,7 +52,11 @@ setup(
         "lz4>=4.0,<5",  # which rosbags needs as well
         "matplotlib>=3.6,<4",
         "mcap>=1.6,<2",  # writes bags, and reads files that were never closed
+        # What each tick computes is compiled by numba (210 MB with llvmlite, BSD-2; 0.3 s more CPU
+        # at the start). Any version will do: its code makes the same sums in the same order.
+        "llvmlite>=0.44",
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
+        "numba>=0.61,<0.70",
         "numpy>=1.26,<3",
         "pybullet==3.2.7",  # exactly, likewise
         "pycollada>=0.9,<0.10",  # meshes of every eighth robot (1.7 MB, BSD-3, pure Python)
@@ -67,8 +71,6 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
-        # `planner: predictive`, `motion reconstruct`: numba compiles rollouts (210 MB, BSD-2).
-        "plan": ["llvmlite>=0.44", "numba>=0.61,<0.70"],
         # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
@@ -100,7 +102,6 @@ setup(
             "mcap-ros2-support>=0.5.5,<0.7",
             "mypy>=2.4,<2.5",
             "myst-parser>=4,<6",
-            "numba>=0.61,<0.70",
             "pytest>=7.4,<10",
             "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",

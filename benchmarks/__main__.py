@@ -12,8 +12,7 @@ from msgs_config.errors import ConfigurationError  # noqa: E402 - after the limi
 from msgs_config.runtime.extras import require_extra  # noqa: E402
 
 try:
-    for extra in ("plan", "view"):
-        require_extra(extra, "make bench")
+    require_extra("view", "make bench")
 except ConfigurationError as error:
     sys.exit(f"error: {error}")
 
@@ -22,6 +21,7 @@ from rich.console import Console  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
+from benchmarks.engines import measure_engines  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.planning import measure_planning  # noqa: E402
 from benchmarks.realtime import measure_realtime  # noqa: E402
@@ -38,6 +38,7 @@ _MEASUREMENTS = {
     "laws": measure_control_laws,
     "search": measure_search,
     "cost": measure_cost,
+    "engines": measure_engines,
     "planning": measure_planning,
     "realtime": measure_realtime,
     "reconstruction": measure_reconstruction,

@@ -31,7 +31,7 @@ def measure_control_laws(console: Console) -> list[Ratio]:
     heading = ("", "law", "with reference", "law / PyBullet's")
     table = make_table("one control law (µs a tick)", heading)
     ratios = []
-    for name in LAWS:
+    for name in LAWS.names:
         if name == _NEEDS_A_FILE:
             continue
         law_us, whole_us = _ours(name, ticks)

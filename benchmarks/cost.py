@@ -23,8 +23,8 @@ from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
+from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.world import World
 from sim_node.simulation_factory import make_simulation
 
 _CHAINS = (1, 8, 32, 100)  # hinges
@@ -111,7 +111,7 @@ def humanoids(count: int) -> dict[str, object]:
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
     loaded = load_parameters(given)
     dofs = sum(each.character.layout.size for each in loaded.characters)
-    with timed(World, "step") as engine:
+    with timed(BulletWorld, "step") as engine:
         alone = np.median(1e6 * step_durations(loaded))
     engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
     return Cost(label, dofs, engine_us, float(alone), _over_topics(loaded, given))

@@ -16,7 +16,7 @@ from benchmarks.support.ratios import Ratio
 from benchmarks.support.round_trip import round_trips
 from benchmarks.support.timing import timed
 from msgs_config.arrays import FloatArray
-from sim_node.physics.world import World
+from sim_node.physics.bullet.world import BulletWorld
 
 _COUNT = 5000  # round trips
 _DURATION = 20.0  # s of simulated time
@@ -39,7 +39,7 @@ def _measure(plan: RunPlan, table: Table) -> list[Ratio]:
     """Add the rows of one character; the ratios of a tick over topics to what it is made of."""
     name, rate = plan.character.name, plan.simulation.rate_hz
     layout = plan.character.layout
-    with timed(World, "step") as steps:
+    with timed(BulletWorld, "step") as steps:
         in_process(plan)
     rows = {
         "(e) the engine's own step": _row(np.array(steps)),

@@ -3,13 +3,13 @@
 Errors are those of `JointLayout.difference`: in rad or m, a rotation's as a rotation vector in the
 child frame. Efforts are in N m or N, in the frames of docs/topics.md. A law without stiffness or
 integral gain is the one with those gains at zero. A new law is a function of `LawContext`,
-`TrackingInput` and `GainArrays` under `@_LAWS.register(NAME)`.
+`TrackingInput` and `GainArrays` under `@equation(NAME)`, or what makes one under `@law(NAME)`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import ConfigurationError
-from msgs_config.settings import Settings, parameter
+from msgs_config.settings import Settings
 
 # Equations
 
@@ -174,78 +174,93 @@ class TrackingInput(NamedTuple):
 Law: TypeAlias = Callable[[TrackingInput, GainArrays], FloatArray]
 """The effort (n,) that answers a state, not clipped yet."""
 
-_LAWS = Registry[Callable[[LawContext, TrackingInput, GainArrays], FloatArray]]()
+
+@dataclass(frozen=True)
+class LawKind:
+    """A law by name: what makes it, and what others must know of it."""
+
+    make: Callable[..., Law]  # of `LawContext`, and of each of the settings that it registers
+    compensates_gravity: bool = False  # its efforts hold the character against its weight
+    # Its effort follows from the state and a target alone, which an environment's actions may move.
+    is_static_feedback: bool = False
 
 
-def make_law(name: str, context: LawContext) -> Law:
-    """The law of that name, one of `LAWS`, at the beginning of an episode.
+LAWS = Registry[LawKind]()
 
-    Raises:
-        ConfigurationError: it is `feedforward`, and there is no series.
+_Equation: TypeAlias = Callable[[LawContext, TrackingInput, GainArrays], FloatArray]
+_Maker = TypeVar("_Maker", bound=Callable[..., Law])
+
+
+def law(name: str, *settings: type[Settings], **known: bool) -> Callable[[_Maker], _Maker]:
+    """Decorate what makes the law of a name, anew for each episode: a class, or a function.
+
+    It gets the `LawContext`, and then the values of the settings, whose live parameters make it
+    anew when they change. It raises ConfigurationError if it cannot be made. `known` is of
+    `LawKind`.
     """
-    if name == "pid":
-        return Pid(context)
-    if name == "feedforward" and context.series is None:
-        raise ConfigurationError("law 'feedforward' needs the parameter 'feedforward': a CSV file")
-    return partial(_LAWS[name], context)
+
+    def add(make: _Maker) -> _Maker:
+        LAWS.register(name, *settings)(LawKind(make, **known))
+        return make
+
+    return add
 
 
-@_LAWS.register("stable_pd")
+def equation(name: str, **known: bool) -> Callable[[_Equation], _Equation]:
+    """Decorate the law of a name that is one equation: it remembers nothing, and has no settings.
+
+    `known` is of `LawKind`.
+    """
+
+    def add(compute: _Equation) -> _Equation:
+        law(name, **known)(lambda context: partial(compute, context))
+        return compute
+
+    return add
+
+
+@equation("stable_pd", is_static_feedback=True)
 def _stable_pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    context.model.update(tracking.position, tracking.velocity)
-    return _implicit(context, tracking, gains, 0.0)
+    return _implicit(context, tracking, gains)
 
 
-@_LAWS.register("computed_torque")
+@equation("computed_torque", compensates_gravity=True, is_static_feedback=True)
 def _computed_torque(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     inverse_dynamics = context.model.inverse_dynamics(tracking.now.acceleration)
     return _implicit(context, tracking, gains, inverse_dynamics)
 
 
-@_LAWS.register("pd_gravity")
+@equation("pd_gravity", compensates_gravity=True, is_static_feedback=True)
 def _pd_gravity(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     context.model.update(tracking.position, tracking.velocity)
     return _pd(context, tracking, gains) + context.model.gravity_force()
 
 
-@_LAWS.register("pd")
+@equation("pd", is_static_feedback=True)
 def _pd(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return pd_effort(gains.stiffness, gains.damping, *_errors(context, tracking))
 
 
-@_LAWS.register("p")
+@equation("p", is_static_feedback=True)
 def _p(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return pd_effort(gains.stiffness, np.zeros(context.layout.size), *_errors(context, tracking))
 
 
-@_LAWS.register("feedforward")
-def _feedforward(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
-    assert context.series is not None
-    return context.series.at(tracking.time)
+@law("feedforward")
+def _feedforward(context: LawContext) -> Law:
+    if context.series is None:
+        raise ConfigurationError("law 'feedforward' needs the parameter 'feedforward': a CSV file")
+    return partial(_play, context.series)
 
 
-@_LAWS.register("zero")
+def _play(series: EffortSeries, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
+    return series.at(tracking.time)
+
+
+@equation("zero")
 def _zero(context: LawContext, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
     return np.zeros(context.layout.size)
-
-
-LAWS = tuple(sorted((*_LAWS.names, "pid")))
-
-
-class LawSettings(Settings):
-    """Which law it is, and of what."""
-
-    law: str = parameter("stable_pd", "the control law", choices=LAWS, live=True)
-    feedforward: str = parameter(
-        "",
-        "the law feedforward's CSV file: time_s and degrees of freedom's efforts",
-        at_reset=True,
-    )
-
-
-COMPENSATES_GRAVITY = ("computed_torque", "pd_gravity")
-"""Laws whose efforts hold the character against its weight."""
 
 
 def _errors(context: LawContext, tracking: TrackingInput) -> tuple[FloatArray, FloatArray]:
@@ -255,20 +270,39 @@ def _errors(context: LawContext, tracking: TrackingInput) -> tuple[FloatArray, F
 
 
 def _implicit(
-    context: LawContext, tracking: TrackingInput, gains: GainArrays, feedforward: FloatArray | float
+    context: LawContext,
+    tracking: TrackingInput,
+    gains: GainArrays,
+    feedforward: FloatArray | None = None,
 ) -> FloatArray:
+    """Stable PD with a feedforward (n,)."""
+    model, upcoming = context.model, tracking.upcoming
+    if not model.is_coupled:
+        return model.stable_pd(
+            tracking.position,
+            tracking.velocity,
+            upcoming.configuration.position,
+            upcoming.velocity,
+            gains.stiffness,
+            gains.damping,
+            context.period,
+            tracking.offset,
+            feedforward,
+        )
+    model.update(tracking.position, tracking.velocity)
     return stable_pd_effort(
-        context.model,
+        model,
         gains.stiffness,
         gains.damping,
-        tracking.next_error(context.model),
+        tracking.next_error(model),
         tracking.velocity,
-        tracking.upcoming.velocity,
+        upcoming.velocity,
         context.period,
-        feedforward,
+        0.0 if feedforward is None else feedforward,
     )
 
 
+@law("pid")
 class Pid:
     """Proportional-integral-derivative control: PD, and `Ki` times the integral of the error.
 

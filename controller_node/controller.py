@@ -12,14 +12,7 @@ from controller_node.behaviours.base import (
     Observation,
     Surroundings,
 )
-from controller_node.control_laws import (
-    COMPENSATES_GRAVITY,
-    GainArrays,
-    Law,
-    LawContext,
-    TrackingInput,
-    make_law,
-)
+from controller_node.control_laws import LAWS, GainArrays, LawContext, TrackingInput
 from controller_node.controller_settings import (
     ControllerSettings,
     EffectiveGains,
@@ -116,7 +109,7 @@ class Controller:
         """Begin an episode, its first state of a stamp in ns: all of another one is forgotten."""
         self._episode_ns = episode_ns
         self.mode: ModeReport | None = None  # since which state which mode holds
-        self._law: Law = make_law(self._settings.law, self._context)
+        self._law = self._settings.make_law(self._context)
         self._behaviour = self._choice.make()
         self._strengths = StrengthSchedule(self.layout)
         self._effective: EffectiveGains | None = None
@@ -146,8 +139,9 @@ class Controller:
     def settings(self, settings: ControllerSettings) -> None:
         """Take others from the next state on. Raises as `check` does."""
         self.check(settings)
-        if settings.law != self._settings.law:
-            self._law = make_law(settings.law, self._context)
+        before = self._settings.law, self._settings.law_settings
+        if (settings.law, settings.law_settings) != before:
+            self._law = settings.make_law(self._context)
         self._settings = settings
         self._effective = None
         self._tracked.follows_velocity = settings.follows_velocity
@@ -155,7 +149,7 @@ class Controller:
 
     def check(self, settings: ControllerSettings) -> None:
         """Raise ConfigurationError if settings cannot be taken."""
-        make_law(settings.law, self._context)
+        settings.make_law(self._context)
         if settings.balance is not None and self._balance is None:
             raise ConfigurationError(
                 f"parameter 'balance.enabled' needs the key 'feet' in {self._character.file}"
@@ -300,7 +294,7 @@ class Controller:
             effort = effort + tracking.effort
         if self._settings.balance is not None and self._balance is not None:
             self._model.update(tracking.position, tracking.velocity)
-            bias = self._settings.law not in COMPENSATES_GRAVITY
+            bias = not LAWS[self._settings.law].compensates_gravity
             effort = effort + self._balance.effort(
                 self._model, self._settings.balance, with_bias=bias
             )

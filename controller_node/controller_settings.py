@@ -3,10 +3,22 @@
 from dataclasses import dataclass
 
 from controller_node.balance import BalanceGains
-from controller_node.control_laws import GainArrays, scale_gains
+from controller_node.control_laws import LAWS, GainArrays, Law, LawContext, scale_gains
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import ConfigurationError
+from msgs_config.settings import Settings, parameter
+
+
+class LawSettings(Settings):
+    """Which law it is, and of what."""
+
+    law: str = parameter("stable_pd", "the control law", choices=LAWS.names, live=True)
+    feedforward: str = parameter(
+        "",
+        "the law feedforward's CSV file: time_s and degrees of freedom's efforts",
+        at_reset=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -18,6 +30,11 @@ class ControllerSettings:
     follows_velocity: bool  # the reference's; else the desired velocity is zero
     balance: BalanceGains | None = None  # None: nothing but the law
     strengths: FloatArray | None = None  # (b,) shares of the gains that count; None: all of them
+    law_settings: tuple[Settings, ...] = ()  # those that the law is registered with
+
+    def make_law(self, context: LawContext) -> Law:
+        """The law, at the beginning of an episode. Raises ConfigurationError if it cannot be."""
+        return LAWS[self.law].make(context, *self.law_settings)
 
 
 def check_planned(settings: ControllerSettings) -> None:

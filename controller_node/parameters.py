@@ -14,9 +14,9 @@ from controller_node.behaviours.factory import (
 )
 from controller_node.behaviours.settings import check_terrain
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
-from controller_node.control_laws import GainArrays, LawSettings
+from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller
-from controller_node.controller_settings import ControllerSettings
+from controller_node.controller_settings import ControllerSettings, LawSettings
 from controller_node.effort_series import read_effort_series
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner
@@ -71,6 +71,7 @@ PARAMETERS = [
     *CharacterSource.declared(),
     *SharedSettings.declared(),
     *LawSettings.declared(),
+    *LAWS.parameters,
     *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
     *PlannerParameters.declared(),
     *ControllerOptions.declared(),
@@ -163,12 +164,14 @@ def make_controller_settings(character: Character, values: Values) -> Controller
         for name in character.vector_names
     ]
     options, is_ragdoll = ControllerOptions.of(values), _is_ragdoll(values)
+    law = "zero" if is_ragdoll else LawSettings.of(values).law
     return ControllerSettings(
-        law="zero" if is_ragdoll else LawSettings.of(values).law,
+        law=law,
         gains=make_gains(character, values),
         follows_velocity=options.reference_velocity == "clip",
         balance=options.balance_gains if options.balance and not is_ragdoll else None,
         strengths=np.array(strengths),
+        law_settings=tuple(each.of(values) for each in LAWS.settings(law)),
     )
 
 

@@ -21,7 +21,7 @@ class Registry(Generic[Maker]):
         self._settings: dict[str, tuple[type[Settings], ...]] = {}
 
     def register(self, name: str, *settings: type[Settings]) -> Callable[[Maker], Maker]:
-        """Decorate the function of a name; what others read as well is declared by one of them."""
+        """Decorate the function of a name; several may read the same settings."""
 
         def add(maker: Maker) -> Maker:
             self._makers[name], self._settings[name] = maker, settings
@@ -33,6 +33,10 @@ class Registry(Generic[Maker]):
         """The function of a name."""
         return self._makers[name]
 
+    def settings(self, name: str) -> tuple[type[Settings], ...]:
+        """The settings that the function of a name reads."""
+        return self._settings[name]
+
     @property
     def names(self) -> tuple[str, ...]:
         """The names, in alphabetical order, as modules may be imported in any."""
@@ -41,5 +45,5 @@ class Registry(Generic[Maker]):
     @property
     def parameters(self) -> list[Parameter]:
         """The parameters of all, in the order of the names."""
-        settings = [each for name in self.names for each in self._settings[name]]
+        settings = dict.fromkeys(each for name in self.names for each in self._settings[name])
         return [parameter for each in settings for parameter in each.declared()]

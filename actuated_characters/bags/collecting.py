@@ -5,9 +5,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from actuated_characters.bags.character_timeline import CharacterTimeline
 from actuated_characters.bags.keyframes import KeyframePlace
 from actuated_characters.bags.reader import RecordedMessage, read_messages, read_topics
-from actuated_characters.bags.tracks import Beginnings, CharacterTimeline, WorldTimeline
+from actuated_characters.bags.world_timeline import Beginnings, WorldTimeline
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
 
@@ -15,8 +16,9 @@ _EARLIER_NS = 200_000_000  # ns by which messages of one tick may be apart, on a
 _LATCHED = tuple(
     f"/{topic.name}"
     for each in topics.TABLE
-    if each.quality.is_latched and each.is_read
+    if each.quality.is_latched
     for topic in each.as_others_name_it
+    if topic.name in WorldTimeline.TOPICS + CharacterTimeline.TOPICS
 )
 
 

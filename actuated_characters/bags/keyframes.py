@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from actuated_characters.bags.reader import read_messages, read_topics
+from actuated_characters.bags.reader import OpenBag, open_bag
 from msgs_config.memory import is_own
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode_header
@@ -45,14 +45,19 @@ def find_keyframes(bag: Path) -> KeyframePlaces | None:
     Raises:
         ActuatedCharactersError: the bag cannot be read.
     """
-    recorded = read_topics(bag)
+    with open_bag(bag) as opened:
+        return _find(opened)
+
+
+def _find(bag: OpenBag) -> KeyframePlaces | None:
+    recorded = bag.types
     simulators = [name for name in recorded if name.endswith(f"/{_SIMULATOR}")]
     controllers = [name for name in recorded if name.endswith(f"/{_CONTROLLER}")]
     if len(simulators) != 1 or len(controllers) != 1:
         return None
     at: dict[int, int] = {}
     answered: set[int] = set()
-    for message in read_messages(bag, (simulators[0], controllers[0])):
+    for message in bag.messages((simulators[0], controllers[0])):
         stamp_ns, _, memory = decode_keyframe(message.raw)
         if not is_own(memory):
             continue
@@ -71,18 +76,18 @@ def find_keyframes(bag: Path) -> KeyframePlaces | None:
     return KeyframePlaces(first_ns, tuple(places))
 
 
-def _first_stamp(bag: Path, namespace: str, keyframes: Collection[int]) -> int | None:
+def _first_stamp(bag: OpenBag, namespace: str, keyframes: Collection[int]) -> int | None:
     """The stamp of the state that the recording of a bag begins with: of an episode's first one.
 
     Where the bag begins in the middle of an episode, it may be that of a keyframe.
     """
     states, episodes = (namespace + each.name for each in (topics.JOINT_STATES, topics.EPISODE))
-    first = next(read_messages(bag, [states]), None)
+    first = next(bag.messages([states]), None)
     if first is None:
         return None
     state = JointStateDecoder().decode(first.raw)
     if not len(state.effort):
         return state.stamp_ns
-    begun = (decode_header(message.raw)[0] for message in read_messages(bag, [episodes]))
+    begun = (decode_header(message.raw)[0] for message in bag.messages([episodes]))
     later = [stamp for stamp in (*keyframes, *begun) if stamp >= state.stamp_ns]
     return min(later, default=None)

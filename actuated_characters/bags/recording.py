@@ -7,6 +7,13 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from actuated_characters.bags.character_timeline import (
+    CONFIGURATION,
+    CharacterTimeline,
+    CommandArrays,
+    ModeChange,
+    States,
+)
 from actuated_characters.bags.collecting import collect, naming
 from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import FILE_SUFFIXES, SUFFIXES
@@ -15,21 +22,12 @@ from actuated_characters.bags.node_parameters import NodeParameters, between, in
 from actuated_characters.bags.plans import PlanArrays
 from actuated_characters.bags.reader import read_topics
 from actuated_characters.bags.rebuilding import RecordedWorld
-from actuated_characters.bags.tracks import (
-    CONFIGURATION,
-    Beginnings,
-    CharacterTimeline,
-    CommandArrays,
-    ModeChange,
-    States,
-    WorldTimeline,
-)
+from actuated_characters.bags.world_timeline import Beginnings, WorldTimeline
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
-from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.projectiles import BallStates
 from msgs_config.messages.throw import ProjectileThrow
@@ -273,8 +271,8 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         effort=states.rows("effort", size)[1:],  # the first state has none
         reference_position=reference_position,
         reference_velocity=reference_velocity,
-        contacts=_at(ends, timeline.wrenches[topics.CONTACTS.name], None),
-        applied_wrench=_at(ends, timeline.wrenches[topics.APPLIED_WRENCH.name], None),
+        contacts=_at(ends, timeline.contacts, None),
+        applied_wrench=_at(ends, timeline.applied, None),
         commands=tuple(tuple(timeline.commands.get(stamp, ())) for stamp in stamp_list),
         controller=tuple(timeline.controller),
         modes=tuple(timeline.modes),

@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from actuated_characters.environments.motion import EpisodeMotion
-from controller_node.control_laws import GainArrays, LawContext, TrackingInput, make_law
+from controller_node.control_laws import LAWS, GainArrays, LawContext, TrackingInput
 from controller_node.controller_settings import ControllerSettings, effective_gains
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
@@ -21,7 +21,6 @@ from msgs_config.messages.state import StampedState
 TARGETS, ANGLES, TORQUES = "targets", "angles", "torques"
 ACTIONS = (TARGETS, ANGLES, TORQUES)
 
-_TRACKING_LAWS = ("computed_torque", "p", "pd", "pd_gravity", "stable_pd")
 _LARGEST_OFFSET = 1.0  # rad, or m where a slider has no limits
 
 
@@ -87,13 +86,14 @@ class TargetActuation:
         Raises:
             ConfigurationError: the law tracks no target, or remembers the ticks before.
         """
-        if settings.law not in _TRACKING_LAWS:
+        if not LAWS[settings.law].is_static_feedback:
+            laws = ", ".join(name for name in LAWS.names if LAWS[name].is_static_feedback)
             raise ConfigurationError(
                 f"law '{settings.law}' follows no target of an action; "
-                f"there are: {', '.join(_TRACKING_LAWS)}; or take action='{TORQUES}'"
+                f"there are: {laws}; or take action='{TORQUES}'"
             )
         self._layout, self._motion, self._clock = character.layout, motion, clock
-        self._law = make_law(settings.law, LawContext(self._layout, model, clock.period_s))
+        self._law = settings.make_law(LawContext(self._layout, model, clock.period_s))
         whole = np.ones(len(self._layout.vector_lengths))
         self._gains: GainArrays = effective_gains(self._layout, settings, whole).gains
         self._limits = EffortLimits(self._layout, self._gains.effort_limits)

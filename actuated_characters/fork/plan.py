@@ -25,7 +25,6 @@ from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node import parameters as controller_parameters
-from controller_node.planner.factory import check_installed
 from controller_node.references.base import Reference, ReferenceState
 from controller_node.references.factory import make_motion
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
@@ -249,7 +248,6 @@ def _run_plan(past: _Past, ticks: int) -> RunPlan:
     simulator = Values({**simulator, **_AS_A_RUN, "lockstep_timeout": timeout, "max_ticks": ticks})
     given = {**first_parameters(recording), "wait_for_subscribers": 0}
     controller = controller_parameters.resolve_for(character, given)
-    check_installed(controller)
     make_motion(character, controller)  # raises where a file is not there any more
     return RunPlan(character, _RecordedMotion(past), simulator, controller, ())
 

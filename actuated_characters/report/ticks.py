@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from actuated_characters.bags.character_timeline import CharacterTimeline
 from actuated_characters.bags.collecting import collect
 from actuated_characters.bags.reader import RecordedMessage, read_messages
 from actuated_characters.bags.recording import Recording, make_recordings
-from actuated_characters.bags.tracks import CharacterTimeline
 from actuated_characters.metrics.error_measures import effort_sizes, limit_shares
 from actuated_characters.metrics.recording_metrics import (
     fall_time,

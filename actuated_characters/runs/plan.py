@@ -8,7 +8,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import BehaviourSettings, choose_behaviour, make_motion
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.model_check import check_agreement
-from controller_node.planner.factory import check_installed, check_planning
+from controller_node.planner.factory import check_planning
 from controller_node.planner.settings import PREDICTIVE, PlannerParameters
 from controller_node.references.base import Motion, Reference
 from controller_node.references.clip import ClipSettings
@@ -113,7 +113,6 @@ def make_plan(
     character = placed(character, simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
     controller, motion = _controller_values(character, controller_given)
-    check_installed(controller)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     planner = PlannerParameters.of(controller).planner

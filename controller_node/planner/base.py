@@ -10,7 +10,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
-    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight
 
 DesiredAt = Callable[[int], ReferenceState]
 """The desired state of a tick, counted from the episode's first state."""

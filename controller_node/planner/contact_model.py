@@ -15,13 +15,13 @@ import numpy as np
 from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.features import Watched
 from controller_node.planner.compiled.law import Joints, LawGains
-from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
-from controller_node.planner.compiled.soft_limits import SoftLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import add_links, compile_exactly, quaternion_starts
 from msgs_config.character.meshes.triangles import is_converted, read_vertices
 from msgs_config.character.model import Character, Link, Shape, ShapeType
+from msgs_config.compiled.mass_matrix import MassMatrix, Tree
+from msgs_config.compiled.soft_limits import SoftLimits, make_soft_limits
 from msgs_config.geometry import rotations
 
 _SOLVER_ITERATIONS = 6
@@ -70,6 +70,11 @@ class ContactModel:
         )
         self._joints = self._find_joints()
         self._limits = self._find_limits()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model."""
+        return self._model
 
     @property
     def feature_count(self) -> int:
@@ -141,16 +146,10 @@ class ContactModel:
             for joint in self._character.moving_joints
             if joint.soft_limit is not None
         ]
-        lower = np.array([limit.lower for _, limit in limited]).reshape(-1, 3)
-        upper = np.array([limit.upper for _, limit in limited]).reshape(-1, 3)
-        return SoftLimits(
-            np.array([joint.qposadr[0] for joint, _ in limited], dtype=np.intp),
-            np.array([joint.dofadr[0] for joint, _ in limited], dtype=np.intp),
-            lower,
-            upper,
-            np.minimum(-lower, upper).min(axis=1, initial=np.inf),
-            np.array([limit.stiffness for _, limit in limited]),
-            np.array([limit.damping for _, limit in limited]),
+        return make_soft_limits(
+            [limit for _, limit in limited],
+            [joint.qposadr[0] for joint, _ in limited],
+            [joint.dofadr[0] for joint, _ in limited],
         )
 
 

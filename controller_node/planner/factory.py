@@ -1,14 +1,11 @@
 """The planner that a controller's parameters say."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import (
     NO_PLANNER,
-    PREDICTIVE,
     RECORDED,
     PlannerParameters,
     check_planner,
@@ -21,15 +18,13 @@ from controller_node.references.offsets import RecordedPlan
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
-from msgs_config.runtime.extras import hint, require_extra
-from msgs_config.shared_parameters import COMMAND_DELAY
 
 if TYPE_CHECKING:
-    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight
 
 
 def check_planning(character: Character, values: Values) -> None:
-    """Raise ActuatedCharactersError as `make_planner`, but for what is not installed."""
+    """Raise ActuatedCharactersError as `make_planner`."""
     name = PlannerParameters.of(values).planner
     if name == NO_PLANNER:
         return
@@ -38,13 +33,6 @@ def check_planning(character: Character, values: Values) -> None:
         _recorded_plan(character, values)
     else:
         make_planner_settings(character, values)
-
-
-def check_installed(values: Values) -> None:
-    """Raise ConfigurationError, with how to get it, where the planner's extra is not installed."""
-    given = PlannerParameters.of(values)
-    if given.planner == PREDICTIVE or (given.planner == RECORDED and given.delay > 0):
-        require_extra("plan", f"planner '{given.planner}'")
 
 
 def make_planner(character: Character, values: Values) -> Planner | None:
@@ -62,8 +50,8 @@ def make_planner(character: Character, values: Values) -> Planner | None:
         plan = _recorded_plan(character, values)
         return RecordedPlanner(plan, _commands_in_flight(character, values))
     settings = make_planner_settings(character, values)
-    with saying_what_it_needs(name):
-        from controller_node.planner.planner import PredictivePlanner
+    from controller_node.planner.planner import PredictivePlanner  # compiled code, for it alone
+
     return PredictivePlanner(character, settings)
 
 
@@ -89,9 +77,9 @@ def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlig
     given = PlannerParameters.of(values)
     if not given.delay:
         return None
-    with saying_what_it_needs(f"{RECORDED}' with '{COMMAND_DELAY.name}"):
-        from controller_node.planner.commands_in_flight import CommandsInFlight
-        from controller_node.planner.contact_model import ContactModel
+    from controller_node.planner.commands_in_flight import CommandsInFlight
+    from controller_node.planner.contact_model import ContactModel
+
     model = ContactModel(
         character,
         period_s=1.0 / given.rate_hz,
@@ -99,16 +87,3 @@ def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlig
         friction=given.friction,
     )
     return CommandsInFlight(character, model, given.delay)
-
-
-@contextmanager
-def saying_what_it_needs(planner: str) -> Iterator[None]:
-    """Raise ConfigurationError, with how to get it, where an import needs numba in vain."""
-    try:
-        yield
-    except ImportError as error:
-        if (error.name or "").partition(".")[0] not in ("numba", "llvmlite"):
-            raise
-        raise ConfigurationError(
-            f"planner '{planner}' needs the extra 'plan' ({error}): {hint('plan')}"
-        ) from error

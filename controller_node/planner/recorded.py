@@ -13,7 +13,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
-    from controller_node.planner.commands_in_flight import CommandsInFlight  # needs numba
+    from controller_node.planner.commands_in_flight import CommandsInFlight
 
 
 class RecordedPlanner:

@@ -11,13 +11,11 @@ from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table, show
 from lecture.framework.catalogue import NAMES, load_study
 from msgs_config.errors import ConfigurationError
-from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from lecture.framework.study import Study
 
 _ALL = "all"
-_COMPARES_PLANS = "athletics"
 
 
 def add_study(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -52,8 +50,6 @@ def _study(options: argparse.Namespace) -> None:
             raise ConfigurationError(
                 f"{directory} is not empty; --overwrite replaces what is there"
             )
-    if _COMPARES_PLANS in names:
-        require_extra("plan", f"study {_COMPARES_PLANS}, which has the planner walk,")
     for number, (name, directory) in enumerate(directories.items(), start=1):
         label = f"{name} ({number} of {len(names)})" if len(names) > 1 else name
         _run_study(load_study(name), label, directory, options)

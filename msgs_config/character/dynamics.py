@@ -6,9 +6,12 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Joint, Link
+from msgs_config.compiled import dynamics as compiled
 from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
+_NONE: FloatArray = np.empty(0)
+_OF_THE_DATA = ("_qpos", "_qvel", "_mass", "view")  # attributes that a copy makes anew
 _NAME = "link "  # before each link's, because MuJoCo's own body is called `world`
 
 _MUJOCO_TYPES = {
@@ -31,17 +34,20 @@ class DynamicsModel:
         self._layout = character.layout
         self._model = _compile(character, gravity)
         self._data = mujoco.MjData(self._model)
-        self._find_views()
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
         self._is_damped = bool(self._damping.any())
         self._coupling = character.coupling.rows(self._layout.size) if character.coupling else None
         # M is stored by rows of its lower triangle, the diagonal last
-        self._diagonal = self._model.M_rowadr + self._model.M_rownnz - 1
+        self._diagonal = (self._model.M_rowadr + self._model.M_rownnz - 1).astype(np.intp)
         # no position at all: no distance, no angle, and as quaternions (wxyz) no turn
         self._identity = np.zeros(self._model.nq)
         self._identity[quaternion_starts(self._model)] = 1.0
         self._start, self._desired = self._identity.copy(), self._identity.copy()
+        self._find_views()
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in self.__dict__.items() if name not in _OF_THE_DATA}
 
     def __setstate__(self, attributes: dict[str, object]) -> None:
         self.__dict__ |= attributes
@@ -49,16 +55,60 @@ class DynamicsModel:
 
     def _find_views(self) -> None:
         self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M
+        self.view = compiled.make_view(
+            self._model._address,
+            self._data._address,
+            self._qpos,
+            self._qvel,
+            self._mass,
+            self._diagonal,
+            self._identity,
+            self._desired,
+            self._damping,
+            self._is_damped,
+        )
+        """What compiled code has of it; not to be kept longer than the model."""
 
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
         """Take over a state: position (n,), message form, and velocity (n,)."""
-        data = self._data
-        self._convert(position, self._qpos)
-        self._qvel[:] = velocity
-        mujoco.mj_kinematics(self._model, data)
-        mujoco.mj_comPos(self._model, data)
-        mujoco.mj_crb(self._model, data)
-        mujoco.mj_comVel(self._model, data)
+        compiled.take_state(self.view, position, velocity)
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether some joints follow others."""
+        return self._coupling is not None
+
+    def stable_pd(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        desired: FloatArray,
+        desired_velocity: FloatArray,
+        stiffness: FloatArray,
+        damping: FloatArray,
+        period: float,
+        offset: FloatArray | None = None,
+        feedforward: FloatArray | None = None,
+    ) -> FloatArray:
+        """The effort (n,) of stable PD in a state, which is taken over, where no joint follows.
+
+        It is `controller_node.control_laws.stable_pd_effort` in one compiled call, with its bits:
+        of position and velocity (n,), those that are desired at the end of a period in s (n,), and
+        gains (n,). An offset (n,) is added to the errors, a feedforward effort (n,) to the law's.
+        """
+        effort: FloatArray = compiled.stable_pd(
+            self.view,
+            position,
+            velocity,
+            desired,
+            desired_velocity,
+            stiffness,
+            damping,
+            _NONE if offset is None else offset,
+            _NONE if feedforward is None else feedforward,
+            period,
+        )
+        return effort
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
         """Error (n,) from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.

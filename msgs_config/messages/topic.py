@@ -87,7 +87,6 @@ class Topic:
     kept: Kept = Kept.UNLESS_EXCLUDED
     session: SessionPlace = SessionPlace.NOWHERE
     is_measured: bool = False  # whether the figures of a run need it
-    is_read: bool = False  # whether `Recording` has it
     # whether the simulator sends one at each tick, which begins with its stamp: players send it too
     is_of_tick: bool = False
     accepted_on: str = ""  # the topic on which a node says which requests it has accepted

@@ -30,7 +30,6 @@ JOINT_STATES = Topic(
     kept=Kept.ALWAYS,
     session=SessionPlace.FRAME_ID,
     is_measured=True,
-    is_read=True,
     is_of_tick=True,
     content=(
         "state at tick k, stamped with its simulated time; `effort` = the commanded torque "
@@ -46,7 +45,6 @@ JOINT_TORQUES = Topic(
     kept=Kept.ALWAYS,
     session=SessionPlace.FRAME_ID_IF_ANY,
     is_measured=True,
-    is_read=True,
     content="`name` + `effort`; `header.stamp` **repeats the stamp of the answered state**",
 )
 EXTERNAL_WRENCH = Topic(
@@ -55,7 +53,6 @@ EXTERNAL_WRENCH = Topic(
     STREAM,
     "any node → sim_node",
     session=SessionPlace.FRAME_ID_IF_ANY,
-    is_read=True,
     content=(
         "pushes: `joint_names` = links, `wrench` in world axes, translations of "
         "`transforms` (optional) = points of application in the link frames, else the "
@@ -68,7 +65,6 @@ APPLIED_WRENCH = Topic(
     STREAM,
     "sim_node → all",
     session=SessionPlace.FRAME_ID,
-    is_read=True,
     is_of_tick=True,
     content=(
         "the pushes that really acted during the previous tick, as `effort` reports the "
@@ -81,7 +77,6 @@ CONTACTS = Topic(
     STREAM,
     "sim_node → all",
     session=SessionPlace.FRAME_ID,
-    is_read=True,
     is_of_tick=True,
     content=(
         "links that touched something during the previous tick, and the net contact force "
@@ -125,7 +120,6 @@ THROW = Topic(
     "any node → sim_node",
     of_world=True,
     session=SessionPlace.FRAME_ID_IF_ANY,
-    is_read=True,
     content=(
         "a ball to throw: `name` has `mass`, `radius`, `x`, `y`, `z`, `vx`, `vy`, `vz`, "
         "`position` their values (kg, m, m/s, world); without `radius` the ball has that of "
@@ -139,7 +133,6 @@ APPLIED_THROW = Topic(
     "sim_node → all",
     of_world=True,
     session=SessionPlace.FRAME_ID,
-    is_read=True,
     content=(
         "a ball released at the beginning of the previous tick, with all its numbers; only "
         "when there was one"
@@ -152,7 +145,6 @@ THROWN = Topic(
     "sim_node → all",
     of_world=True,
     session=SessionPlace.FRAME_ID,
-    is_read=True,
     content=(
         "centre, orientation and velocities of the balls `ball_1`, ...; every tick while "
         "there are any. With several characters, `throw`, `applied_throw` and `thrown` "
@@ -251,7 +243,6 @@ REFERENCE = Topic(
     nodes=(CONTROLLER_NODE,),
     session=SessionPlace.FRAME_ID_IF_ANY,
     is_measured=True,
-    is_read=True,
     content=(
         "the desired state *at* its stamp, which is the stamp of the torque computed from "
         "it; stable PD itself looks at the reference one tick later"
@@ -351,7 +342,6 @@ MODE = Topic(
     "controller_node → all",
     nodes=(CONTROLLER_NODE,),
     is_measured=True,
-    is_read=True,
     content=(
         "latched, JSON: `mode`, `stamp_ns` of the state from which it holds, and its cause "
         "(the link struck and the impulse, the clip found and its distance, the "
@@ -364,7 +354,6 @@ PLAN = Topic(
     STREAM,
     "controller_node → all",
     nodes=(CONTROLLER_NODE,),
-    is_read=True,
     content=(
         "one message per plan, stamped with the first state in which the plan acts, with "
         "one point per check: the expected centre of mass (`x`, `y`, `z`, world) at `time` "
@@ -398,7 +387,6 @@ CONFIGURATION = Topic(
     kept=Kept.ALWAYS,
     session=SessionPlace.CONFIGURATION,
     is_measured=True,
-    is_read=True,
     content=(
         "latched, JSON: character file, URDF text, parameters (the initial state among them) and "
         "the stamp after which they are in force, its `session`, versions of package, engines, "
@@ -411,7 +399,6 @@ CONTROLLER_CONFIGURATION = Topic(
     LATCHED,
     "controller_node → all",
     nodes=(CONTROLLER_NODE,),
-    is_read=True,
     content="the same of the controller; again at each change of its parameters",
 )
 _KEYFRAME = Topic(
@@ -419,7 +406,6 @@ _KEYFRAME = Topic(
     "sensor_msgs/msg/CompressedImage",
     DISPLAY,
     session=SessionPlace.FRAME_ID,
-    is_read=True,
 )
 KEYFRAME = replace(
     _KEYFRAME,
@@ -469,12 +455,6 @@ TABLE = tuple(
     value for name, value in list(globals().items()) if isinstance(value, Topic) and name[0] != "_"
 )
 """All topics, in the order of the documentation."""
-
-
-def names_to_read(*, of_world: bool) -> tuple[str, ...]:
-    """The topics that a recording is read from, of a world or of a character in it."""
-    read = [each for each in TABLE if each.is_read and each.of_world is of_world]
-    return tuple(topic.name for each in read for topic in each.as_others_name_it)
 
 
 def contact_wrench(link: str) -> Topic:

@@ -7,7 +7,6 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 PACKAGES = {
     "gymnasium": ("gymnasium",),
     "meshes": ("trimesh",),
-    "plan": ("numba",),
     "video": ("av",),
     "view": ("viser", "websockets"),
     "wheels": ("rclpy",),

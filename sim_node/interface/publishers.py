@@ -1,7 +1,8 @@
 """The publishers of one character: state, contacts, wrenches, sensors, episode, and displays."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.bus.node import BusNode, Publisher, StopFlag
@@ -22,6 +23,18 @@ from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.timing.watchdog import Watchdog, WatchdogEvent
 
 
+class _OfTick(NamedTuple):
+    """A topic that has a message of each tick."""
+
+    publisher: Publisher
+    encode: Callable[[], bytes]
+    needs_contacts: bool = False  # there is no message of a tick whose contacts were not found
+
+    @property
+    def is_heard(self) -> bool:
+        return has_subscribers(self.publisher)
+
+
 class CharacterPublishers:
     """The publishers of one character. A topic without subscribers costs nothing."""
 
@@ -34,7 +47,9 @@ class CharacterPublishers:
         self._links = [link.name for link in character.character.links]
         self._last_state = b""
         self._last_episode: bytes | None = None
-        self._make_encoders()
+        self._state_encoder = JointStateEncoder(character.layout.dof_names, session)
+        self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
+        self._contacts_encoder = SelectionEncoder(self._links, session)
 
         def create(topic: Topic) -> Publisher:
             return node.publisher(topic.under(character.setup.name))
@@ -42,19 +57,17 @@ class CharacterPublishers:
         self._episode = create(topics.EPISODE)
         self.configuration = create(topics.CONFIGURATION.of(node.get_name()))
         self._states = create(topics.JOINT_STATES)
-        self._contacts = create(topics.CONTACTS)
-        self._wrenches = create(topics.APPLIED_WRENCH)
-        self._throttled_states = create(topics.JOINT_STATES_THROTTLE)
-        self._throttled_contacts = create(topics.CONTACTS_THROTTLE)
-        self._throttled_wrenches = create(topics.APPLIED_WRENCH_THROTTLE)
+        self._before_state = [  # in the order of publishing
+            _OfTick(create(topics.CONTACTS), self._encode_contacts, needs_contacts=True),
+            _OfTick(create(topics.APPLIED_WRENCH), self._encode_applied),
+        ]
+        self._throttled = [
+            _OfTick(create(topics.CONTACTS_THROTTLE), self._encode_contacts, needs_contacts=True),
+            _OfTick(create(topics.APPLIED_WRENCH_THROTTLE), self._encode_applied),
+            _OfTick(create(topics.JOINT_STATES_THROTTLE), lambda: self._last_state),
+        ]
         self._sensors = SensorPublishers(node, character, settings)
         self._display = DisplayPublishers(node, character, settings)
-
-    def _make_encoders(self) -> None:
-        session = self._session
-        self._state_encoder = JointStateEncoder(self._character.layout.dof_names, session)
-        self._no_wrenches = encode_wrenches(WrenchArrays.of_rows(0, [], [], [], session))
-        self._contacts_encoder = SelectionEncoder(self._links, session)
 
     @property
     def state_subscribers(self) -> int:
@@ -66,11 +79,11 @@ class CharacterPublishers:
 
         Subscribers of the `throttled` ones count where the tick is one of theirs.
         """
+        due = [*self._before_state, *(self._throttled if throttled else ())]
         return (
-            has_subscribers(self._contacts)
+            any(each.needs_contacts and each.is_heard for each in due)
             or self._display.wants_contacts
             or self._sensors.wants_contacts
-            or (throttled and has_subscribers(self._throttled_contacts))
         )
 
     def publish_configuration(
@@ -113,10 +126,7 @@ class CharacterPublishers:
 
     def before_state(self) -> Iterator[Outgoing]:
         """The messages that a controller may wait for beside a tick's state, which follows them."""
-        if self._character.contacts is not None and has_subscribers(self._contacts):
-            yield self._contacts, self._encode_contacts()
-        if has_subscribers(self._wrenches):
-            yield self._wrenches, self._encode_applied()
+        yield from self._messages(self._before_state)
         yield from self._sensors.messages()
 
     def state(self) -> Outgoing:
@@ -130,12 +140,14 @@ class CharacterPublishers:
 
     def throttled(self) -> Iterator[Outgoing]:
         """The messages of the tick for those who do not need each one, the state last."""
-        if self._character.contacts is not None and has_subscribers(self._throttled_contacts):
-            yield self._throttled_contacts, self._encode_contacts()
-        if has_subscribers(self._throttled_wrenches):
-            yield self._throttled_wrenches, self._encode_applied()
-        if has_subscribers(self._throttled_states):
-            yield self._throttled_states, self._last_state
+        return self._messages(self._throttled)
+
+    def _messages(self, of_tick: Sequence[_OfTick]) -> Iterator[Outgoing]:
+        """The messages of the tick on topics that have subscribers."""
+        has_contacts = self._character.contacts is not None
+        for each in of_tick:
+            if (has_contacts or not each.needs_contacts) and each.is_heard:
+                yield each.publisher, each.encode()
 
     def publish_display(self, tick: int) -> None:
         """Publish what shows a tick's state, while the controller works on that state."""
@@ -151,8 +163,9 @@ class CharacterPublishers:
         if with_episode and self._last_episode is not None:
             self._episode.publish(self._last_episode)
         if with_state:
-            if has_subscribers(self._contacts):
-                self._contacts.publish(self._encode_contacts())
+            for each in self._before_state:
+                if each.needs_contacts and each.is_heard:
+                    each.publisher.publish(each.encode())
             publish_together(self._sensors.messages())
             self._states.publish(self._last_state)
 
@@ -160,8 +173,8 @@ class CharacterPublishers:
     def of_ticks(self) -> list[Publisher]:
         """The publishers of what comes again at each tick."""
         return [
-            *(self._states, self._contacts, self._wrenches),
-            *(self._throttled_states, self._throttled_contacts, self._throttled_wrenches),
+            self._states,
+            *(each.publisher for each in (*self._before_state, *self._throttled)),
             *(*self._sensors.publishers, *self._display.streams),
         ]
 

@@ -2,8 +2,8 @@
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
+from sim_node.physics.engine import make_world
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 
 
 class Ground:
@@ -11,7 +11,7 @@ class Ground:
 
     def __init__(self, terrain: UrdfOptions) -> None:
         """Load a terrain's URDF. Raises CharacterError if it cannot be loaded."""
-        self._world = World(WorldSettings(ground=False, terrain=terrain))
+        self._world = make_world(WorldSettings(ground=False, terrain=terrain))
 
     def heights_below(self, points: FloatArray) -> FloatArray:
         """Height z (r,) in m of the highest surface below each point (r, 3); 0 without one."""

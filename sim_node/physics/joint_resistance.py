@@ -11,7 +11,7 @@ mass, and in the position that they are in. Which joints rest is found by trial:
 more than F slides, one that is driven by its friction rests (Murty 1974, as in `passive_forces`).
 
 Contacts are not foreseen. What they do to friction and coupling is left to the rows of the engine's
-own solver (`joint_constraints`), which find nothing to do without contacts.
+own solver (`Body.set_friction`), which find nothing to do without contacts.
 """
 
 import numpy as np
@@ -19,8 +19,9 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
-from sim_node.physics.joint_constraints import CORRECTION
 
+COUPLING_CORRECTION = 0.1
+"""The share of a coupling's error in position that a step takes away."""
 _LIMIT_CORRECTION = 0.2  # share of a limit's excess that a step corrects, as the engine's own do
 _MOST_TRIALS = 20
 _LOCKING_INERTIA = 1e9  # times its own inertia, added to a joint that rests: that keeps it there
@@ -54,7 +55,7 @@ class JointResistance:
         """
         step, bias = self._step_s, model.bias_force()
         heavy = _LOCKING_INERTIA * model.inertia_of_entries()
-        rate = self._coupling.violation(position) * (-CORRECTION / (step * step))
+        rate = self._coupling.violation(position) * (-COUPLING_CORRECTION / (step * step))
         target, at_limit, side = self._limits(position, velocity)
         rests, slides = self._first_guess(velocity, heavy / _LOCKING_INERTIA)
         stopped = np.zeros(len(velocity), dtype=np.bool_)

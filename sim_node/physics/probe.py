@@ -8,9 +8,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CharacterError
 from msgs_config.messages.probe import DynamicsSample
-from sim_node.physics.body import Body
+from sim_node.physics.engine import Body, World, make_world
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 
 INSTANT = 1e-7
 """An engine step, s, so short that a difference quotient over it is a derivative."""
@@ -47,7 +46,7 @@ def measure_probe(character: Character, gravity: float) -> DynamicsSample:
     rng = np.random.default_rng(_SEED)
     position = _position(character, rng)
     velocity = rng.uniform(-_SPEED, _SPEED, layout.size)
-    with World(still_settings(gravity=0.0)) as world:
+    with make_world(still_settings(gravity=0.0)) as world:
         body = _add_without_collisions(world, character)
         inverse_mass = _inverse_mass_matrix(world, body, character)
         _check_inverse_mass(character, np.diag(inverse_mass))

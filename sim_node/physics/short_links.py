@@ -24,7 +24,7 @@ from msgs_config.character.lowest_points import links_in_ground
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 from msgs_config.shared_parameters import PLANE
-from sim_node.physics.engine_defaults import UNLIMITED_SPEED
+from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.settings import SimulationSettings
 
 _SHORT_LENGTH = 0.1  # m: at 10 m/s such a pendulum turns at Bullet's own bound, 100 rad/s

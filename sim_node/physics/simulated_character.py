@@ -1,7 +1,7 @@
 """One character's part in a simulation: efforts and wrenches in, its state and contacts out."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,11 +12,9 @@ from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
 from sim_node.initial_state import check_length
-from sim_node.physics.balls.projectiles import Projectiles
-from sim_node.physics.body import Body
+from sim_node.physics.engine import Balls, Body
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.short_links import speed_bounds
-from sim_node.physics.touches import TouchedLinks
 from sim_node.physics.wrenches import ExternalWrench
 
 
@@ -65,7 +63,7 @@ class SimulatedCharacter:
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
     pushes: tuple[ExternalWrench, ...]  # those that acted during the last tick
-    balls: Projectiles  # the balls of its world
+    balls: Balls  # the balls of its world
     speed_bounds: dict[bool, float]
     """Of every degree of freedom in the engine, rad/s or m/s; by whether there is a ground."""
 
@@ -106,7 +104,7 @@ class SimulatedCharacter:
         coupling = self.character.coupling
         self._position, self._velocity = coupling.position(position), coupling.velocity(velocity)
 
-    def enter(self, body: Body, balls: Projectiles, gravity: float, stamp_ns: int) -> None:
+    def enter(self, body: Body, balls: Balls, gravity: float, stamp_ns: int) -> None:
         """Enter a world, as the body that was added there, in the initial state.
 
         Its gravity is in m/s^2 along -z.
@@ -116,7 +114,7 @@ class SimulatedCharacter:
         self._body, self.balls = body, balls
         body.set_state(self._position, self._velocity)
         self._contacts: Contacts | None = self._no_contacts
-        self._touched: Callable[[], TouchedLinks] | None = None
+        self._contacts_are_due = False  # the engine has them, and they were not asked for yet
         self.pushes = ()
         self.before = None
         self._read(stamp_ns, effort=None)
@@ -132,7 +130,7 @@ class SimulatedCharacter:
             self.saturated_ticks += self.layout.norms(wanted) > self._limits.values
         self.pushes = tuple(pushes)
         self._contacts = self._no_contacts if watches_contacts else None
-        self._touched = None
+        self._contacts_are_due = False
 
     def begin_substep(self, first: bool) -> None:
         """Apply all forces again for one engine step."""
@@ -146,16 +144,16 @@ class SimulatedCharacter:
         if self.pushes:
             self._body.push((push.link, push.wrench, push.point) for push in self.pushes)
 
-    def add_contacts(self, touched: Callable[[], TouchedLinks], share: float) -> None:
+    def add_contacts(self, share: float) -> None:
         """Add the contacts of the last engine step, which is a share of the tick.
 
         Where it is the whole tick, they are left to be found when they are asked for: the
-        engine has them until its next step. `touched` is what it has.
+        engine has them until its next step.
         """
         if share == 1.0:
-            self._touched = touched
+            self._contacts_are_due = True
             return
-        wrenches, touching = self._step_contacts(touched)
+        wrenches, touching = self._body.contact_wrenches()
         assert self._contacts is not None
         self._contacts = Contacts(
             self._contacts.wrenches + share * wrenches, self._contacts.touching | touching
@@ -177,13 +175,9 @@ class SimulatedCharacter:
 
     def find_contacts(self) -> None:
         """Find the last tick's contacts, unless it was done, before the engine forgets them."""
-        if self._touched is not None:
-            touched, self._touched = self._touched, None
-            self._contacts = Contacts(*self._step_contacts(touched))
-
-    def _step_contacts(self, touched: Callable[[], TouchedLinks]) -> tuple[FloatArray, BoolArray]:
-        """Net wrenches (links, 6) of the last engine step, and which links (links,) touched."""
-        return self._body.contact_wrenches(touched(), self._body.centres_at_step())
+        if self._contacts_are_due:
+            self._contacts_are_due = False
+            self._contacts = Contacts(*self._body.contact_wrenches())
 
     def end_tick(self, stamp_ns: int) -> None:
         """Read the state that the tick has led to."""
@@ -205,7 +199,7 @@ class SimulatedCharacter:
     def restore(self, snapshot: CharacterSnapshot) -> None:
         """Restore a snapshot; the engine's state is restored by the simulation."""
         self.state, self.before = snapshot.state, snapshot.before
-        self._contacts, self._touched = snapshot.contacts, None
+        self._contacts, self._contacts_are_due = snapshot.contacts, False
         self.pushes = snapshot.pushes
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()

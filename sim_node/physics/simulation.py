@@ -9,13 +9,13 @@ from msgs_config.errors import ClosedError, SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.engine import World, make_world
 from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import (
     CharacterSetup,
     CharacterSnapshot,
     SimulatedCharacter,
 )
-from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 
 
@@ -144,7 +144,7 @@ class Simulation:
             self._world.step()
             if self.watches_contacts:
                 for character in self.characters:
-                    character.add_contacts(self._world.touched_links, share=1.0 / substeps)
+                    character.add_contacts(share=1.0 / substeps)
             for character in self.characters:
                 character.end_substep()
         self.tick += 1
@@ -250,12 +250,14 @@ class Simulation:
             character.restore(its)
 
     def _fresh_world(self) -> World:
-        world = World(self.settings.world)
+        world = make_world(self.settings.world)
         try:
-            for character in self.characters:
-                bound = character.speed_bounds[self.settings.world.ground]
-                body = world.add(character.character, bound)
-                character.enter(body, world.balls, self.settings.world.gravity, self.stamp_ns)
+            ground, gravity = self.settings.world.ground, self.settings.world.gravity
+            bodies = [
+                world.add(each.character, each.speed_bounds[ground]) for each in self.characters
+            ]
+            for character, body in zip(self.characters, bodies, strict=True):
+                character.enter(body, world.balls, gravity, self.stamp_ns)
         except Exception:
             world.close()
             raise

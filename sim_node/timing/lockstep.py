@@ -20,8 +20,8 @@ class CommandStatus(StrEnum):
 
     ACCEPTED = "accepted"
     DUPLICATE = "duplicate"  # repeats a command that was accepted
-    CONFLICT = "conflict"  # differs from another command for the same state
-    STALE = "stale"  # answers an earlier state, and comes too late
+    CONFLICT = "conflict"  # differs from what was taken for the same state; it may come late, too
+    STALE = "stale"  # answers an earlier state, too late, and contradicts nothing that was taken
     FUTURE = "future"  # answers a state that was never published
     REJECTED = "rejected"  # malformed; nothing of it is taken
 

@@ -12,7 +12,7 @@ from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from sim_node.physics.body import Body
+from sim_node.physics.engine import Body
 from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,

@@ -71,7 +71,7 @@ def walker(law: str, series: str, **given: object) -> Any:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("before", "after"), list(permutations(LAWS, 2)))
+@pytest.mark.parametrize(("before", "after"), list(permutations(LAWS.names, 2)))
 def test_another_law_answers_the_next_state_as_if_it_had_always_done(
     before: str, after: str, series: str
 ) -> None:
@@ -133,7 +133,7 @@ def test_looking_whether_settings_can_be_taken_changes_nothing(series: str) -> N
     answers(driver, 1, 2)
     answers(untouched, 1, 2)
 
-    for law in LAWS:
+    for law in LAWS.names:
         driver.check(walker(law, series).settings)
 
     assert answers(driver, 3, 4).tobytes() == answers(untouched, 3, 4).tobytes()
@@ -143,7 +143,10 @@ def test_looking_whether_settings_can_be_taken_changes_nothing(series: str) -> N
 
 
 def await_configuration(simulator: ControllerClient, **expected: object) -> dict[str, Any]:
-    """The configuration that holds these values, once it has come."""
+    """The configuration that holds these values, once it has come.
+
+    They must be all that have changed: an older one may have the last of them, too.
+    """
 
     def found() -> dict[str, Any] | None:
         for message in reversed(simulator.configuration.messages):
@@ -175,7 +178,7 @@ def test_laws_and_gains_of_a_hinge_are_their_closed_forms_from_the_next_state_on
         ("law", "zero", lambda e, v, i: 0.0),
     ]
     assert list(simulator.ask(as_message("pendulum", some_state("pendulum", 1))).effort) == [0.0]
-    integral, in_pid = 0.0, False
+    integral, in_pid, in_force = 0.0, False, dict[str, object]()
     for tick, (name, value, law) in enumerate(changes, start=2):
         # Act
         taken, reason = simulator.set_parameter(NODE, name, value)
@@ -189,7 +192,8 @@ def test_laws_and_gains_of_a_hinge_are_their_closed_forms_from_the_next_state_on
         in_pid = in_pid or value == "pid"
         expected = law(error, velocity, integral)
         assert torques.effort[0] == pytest.approx(expected, rel=1e-9, abs=1e-12), (name, value)
-        content = await_configuration(simulator, **{name: value})
+        in_force[name] = value
+        content = await_configuration(simulator, **in_force)
         assert content["parameters_after_stamp_ns"] == CLOCK.stamp_ns(tick - 1)
         assert simulator.get_parameters(NODE, [name]) == [value]
 
@@ -230,9 +234,9 @@ def test_what_runs_the_humanoid_is_changed_step_by_step(
         last = effort
         for name, value in changes[tick - 1 : tick]:
             assert simulator.set_parameter(NODE, name, value) == (True, "")
-            content = await_configuration(simulator, **{name: value})
-            assert content["parameters_after_stamp_ns"] == state.stamp_ns
             in_force[name] = value
+            content = await_configuration(simulator, **in_force)
+            assert content["parameters_after_stamp_ns"] == state.stamp_ns
 
 
 def test_a_change_before_the_first_answer_counts_from_the_beginning(

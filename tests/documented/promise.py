@@ -7,6 +7,8 @@ from typing import Any
 
 import yaml
 
+from lecture.framework.catalogue import NAMES
+
 FILE = Path(__file__).with_name("promises.yaml")
 _OF_ROS = ("ros2 ", "rviz2 ", "source /opt/ros/")  # the wheels have no such programs
 
@@ -46,11 +48,15 @@ _KNOWN = {each.name for each in fields(Promise)}
 
 
 def read_promises() -> dict[str, Promise]:
-    """The promises by command. Raises ValueError where a key is none."""
+    """The promises by command, those of the studies too. Raises ValueError where a key is none."""
     content = yaml.safe_load(FILE.read_text(encoding="utf-8"))
-    return {
+    written = {
         str(command).rstrip("\n"): _promise(command, given) for command, given in content.items()
     }
+    studies = {
+        f"actuated_characters study {name}": Promise(makes=(f"studies/{name}",)) for name in NAMES
+    }
+    return studies | written
 
 
 def _promise(command: str, given: Mapping[str, Any]) -> Promise:

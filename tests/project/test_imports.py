@@ -25,7 +25,7 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
     "pybullet": {"msgs_config/character/bullet.py"},
     "mujoco": {
         "msgs_config/character/dynamics.py",
-        "controller_node/planner/compiled/mujoco_functions.py",
+        "msgs_config/compiled/mujoco_functions.py",
         "controller_node/planner/contact_model.py",
     },
 }
@@ -166,7 +166,7 @@ def test_every_python_package_that_is_imported_is_required() -> None:
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])
-    optional = ("video", "plan", "gymnasium", "completion", "meshes", "view", "xacro")
+    optional = ("video", "gymnasium", "completion", "meshes", "view", "xacro")
     requirements += [each for extra in optional for each in extras[extra]]
     names = {re.split(r"[<>=[]", requirement)[0] for requirement in requirements}
     required = {distributions.get(name, name) for name in names}

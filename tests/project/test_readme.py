@@ -12,6 +12,8 @@ import pytest
 
 from actuated_characters.bags.reader import read_messages
 from actuated_characters.cli import _parser
+from controller_node.control_laws import LAWS
+from controller_node.references.factory import REFERENCES
 from tests.support import parameter_page, topic_table
 
 ROOT = Path(__file__).parents[2]
@@ -79,6 +81,20 @@ def test_what_a_page_links_to_and_names_is_there(page: Path) -> None:
 def test_the_page_of_parameters_is_that_of_their_declarations() -> None:
     page = parameter_page.PAGE.read_text(encoding="utf-8")
     assert page == parameter_page.content(), "make pages renews it"
+
+
+@pytest.mark.parametrize(
+    ("page", "names"),
+    [("controllers.md", LAWS.names), ("characters.md", REFERENCES.names)],
+    ids=["laws", "references"],
+)
+def test_every_law_and_reference_has_a_row_in_its_table(page: str, names: tuple[str, ...]) -> None:
+    rows = re.findall(
+        r"^\| (`.*?) \|", (ROOT / "docs" / page).read_text("utf-8"), flags=re.MULTILINE
+    )
+    missing = [name for name in names if not any(f"`{name}`" in row for row in rows)]
+
+    assert missing == [], f"docs/{page} needs a row of each in its table"
 
 
 @pytest.mark.slow

@@ -153,7 +153,7 @@ def test_the_state_path_has_both_sides() -> None:
         "msgs_config/geometry/rotations.py",
         "sim_node/physics/balls/sphere_sweep.py",
         "sim_node/timing/lockstep.py",
-        "sim_node/physics/body.py",
+        "sim_node/physics/bullet/body.py",
         "sim_node/physics/passive_forces.py",
     } <= path
     assert not path & {

@@ -24,11 +24,11 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
 from sim_node import parameters as for_simulator
-from sim_node.physics.body import Body
+from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import CharacterSetup, SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 from sim_node.simulation_factory import (
     make_character_setup,
@@ -102,14 +102,14 @@ def random_rotation_vector(rng: np.random.Generator) -> FloatArray:
     return direction / np.linalg.norm(direction) * rng.uniform(0.0, 3.14)
 
 
-def touches(body: Body) -> bool:
+def touches(body: BulletBody) -> bool:
     """Whether any link is in contact with anything, or about to be."""
     pybullet.performCollisionDetection(physicsClientId=body._client)
     return bool(pybullet.getContactPoints(physicsClientId=body._client))
 
 
 def free_random_state(
-    body: Body, whole: Character, rng: np.random.Generator
+    body: BulletBody, whole: Character, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """A random state that the body is put into, drawn again until it touches nothing."""
     for _ in range(100):
@@ -136,7 +136,7 @@ class DenseDynamics:
         return self.bias
 
 
-class LoneWorld(World):
+class LoneWorld(BulletWorld):
     """A world of one character."""
 
     def __init__(self, whole: Character, settings: WorldSettings) -> None:
@@ -195,7 +195,7 @@ class LinkMotion:
         return orbital + self.inertia @ self.angular_velocity
 
 
-def link_motions(body: Body, whole: Character) -> list[LinkMotion]:
+def link_motions(body: BulletBody, whole: Character) -> list[LinkMotion]:
     """The motion of every link, in the character's order, by the engine's numbers."""
     motions = []
     for link, number in zip(whole.links, link_numbers(body, whole), strict=True):
@@ -226,7 +226,7 @@ def link_motions(body: Body, whole: Character) -> list[LinkMotion]:
     return motions
 
 
-def link_numbers(body: Body, whole: Character) -> list[int]:
+def link_numbers(body: BulletBody, whole: Character) -> list[int]:
     """The engine's number of every link, in the character's order; -1 is the base."""
     count = pybullet.getNumJoints(body._body, physicsClientId=body._client)
     infos = [
@@ -236,13 +236,13 @@ def link_numbers(body: Body, whole: Character) -> list[int]:
     return [-1, *(numbers[link.name] for link in whole.links[1:])]
 
 
-def link_number(body: Body, whole: Character, joint_name: str) -> int:
+def link_number(body: BulletBody, whole: Character, joint_name: str) -> int:
     """The engine's number of the link that a joint moves."""
     index = [link.joint.name for link in whole.links].index(joint_name)
     return link_numbers(body, whole)[index]
 
 
-def link_poses(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
+def link_poses(body: BulletBody, whole: Character) -> tuple[FloatArray, FloatArray]:
     """Origins (links, 3) and quaternions xyzw (links, 4) of the link frames in the world.
 
     From the inertial frames: what the engine says of link frames has single precision.
@@ -257,12 +257,12 @@ def link_poses(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
     return np.array(origins), np.array(turns)
 
 
-def kinetic_energy(body: Body, whole: Character) -> float:
+def kinetic_energy(body: BulletBody, whole: Character) -> float:
     """Kinetic energy of all links, J."""
     return sum(motion.kinetic_energy for motion in link_motions(body, whole))
 
 
-def momentum(body: Body, whole: Character) -> tuple[FloatArray, FloatArray]:
+def momentum(body: BulletBody, whole: Character) -> tuple[FloatArray, FloatArray]:
     """Linear (N s) and angular momentum (N m s, about the world's origin) of all links."""
     motions = link_motions(body, whole)
     linear = sum(motion.mass * motion.velocity for motion in motions)

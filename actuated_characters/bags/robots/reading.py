@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from actuated_characters.bags.character_timeline import CONFIGURATION
 from actuated_characters.bags.reader import read_topics
 from actuated_characters.bags.recording import (
     JOINT_STATE,
@@ -18,7 +19,6 @@ from actuated_characters.bags.recording import (
 from actuated_characters.bags.robots.base_poses import BaseMotion, base_frames, find_base
 from actuated_characters.bags.robots.decoding import read_timed
 from actuated_characters.bags.robots.joint_series import JointSeries, collect_joints
-from actuated_characters.bags.tracks import CONFIGURATION
 from msgs_config import files
 from msgs_config.arrays import IntArray
 from msgs_config.character.file import CharacterFile, read_character_file, read_character_texts

@@ -18,8 +18,7 @@ OVERVIEW = {
     "motion import my_capture.bvh": "a clip of your own capture, for --clip",
     "run --clip walk --duration 20": "a recorded run, and its figures",
     "run --view --clip dance_a": "any run in the browser",
-    "run --clip backflip --duration 1.75 --planner predictive": "by joint torques "
-    "alone; needs the extra 'plan'",
+    "run --clip backflip --duration 1.75 --planner predictive": "by joint torques alone",
     "run --parameters controller_node": "all that --set can set of a node",
     "run --help": "all options",
 }

@@ -60,7 +60,7 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         "--planner",
         ParameterChoices(_CONTROLLER, "planner", without=("recorded",)),
         help="keep the motion by joint torques alone, planned ahead (predictive: without root "
-        "assistance; needs the extra 'plan'), or not (none, the default)",
+        "assistance), or not (none, the default)",
     )
 
 

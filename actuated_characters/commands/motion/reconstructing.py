@@ -88,11 +88,8 @@ def _add_search(command: argparse.ArgumentParser) -> None:
 
 
 def _reconstruct(options: argparse.Namespace) -> None:
-    from controller_node.planner.factory import saying_what_it_needs
-    from controller_node.planner.settings import PREDICTIVE
+    from actuated_characters.reconstruction.reconstruction import reconstruct
 
-    with saying_what_it_needs(PREDICTIVE):
-        from actuated_characters.reconstruction.reconstruction import reconstruct
     job = _job(options)
     with progress_bar(f"{job.problem.character}: {job.problem.clip}", 1, "windows") as bar:
 

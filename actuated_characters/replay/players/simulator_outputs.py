@@ -3,7 +3,7 @@
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from msgs_config.arrays import IntArray
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics, typed
 from msgs_config.messages.cdr import (
+    JOINT_STATE,
     decode_header,
     decode_string,
     encode_header,
@@ -24,8 +25,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from msgs_config.messages.session import episode_text
-from msgs_config.messages.topic import Kept, Topic
-from msgs_config.messages.wrenches import decode_wrenches, encode_wrenches
+from msgs_config.messages.topic import Kept, SessionPlace, Topic
 
 REQUESTS = tuple(topic.of(topics.CONTROLLER_NODE) for topic in topics.TABLE if topic.accepted_on)
 """What a controller is asked for while it works."""
@@ -63,26 +63,29 @@ class SessionRewriter:
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
 
     def rewrite(self, topic: Topic, raw: bytes) -> bytes:
-        """A message of the simulator; one of a topic that names no session stays as it is.
+        """A message on a topic; one of a topic that names no session stays as it is.
 
         Raises:
             MessageError: the bytes are no message of the topic.
         """
-        if topic is topics.JOINT_STATES:
+        match topic.session:
+            case SessionPlace.NOWHERE:
+                return raw
+            case SessionPlace.EPISODE:
+                stamp_ns, frame_id = decode_header(raw)
+                number = frame_id.partition(" ")[0]  # of older bags it is all that is there
+                text = episode_text(int(number) if number.isdecimal() else 1, self._session)
+                return encode_header(stamp_ns, text)
+            case SessionPlace.CONFIGURATION:
+                content = {**json.loads(decode_string(raw)), "session": self._session}
+                return encode_string(json.dumps(content, allow_nan=False))
+        if topic.type_name == JOINT_STATE:  # one a tick, whose names are always the same
             state = self._decoder.decode(raw)
             arrays = (state.position, state.velocity, state.effort)
             return self._encoder(state.names).encode(state.stamp_ns, *arrays)
-        if topic in (topics.CONTACTS, topics.APPLIED_WRENCH):
-            return encode_wrenches(replace(decode_wrenches(raw), frame_id=self._session))
-        if topic is topics.EPISODE:
-            stamp_ns, frame_id = decode_header(raw)
-            number = frame_id.partition(" ")[0]  # of older bags it is all that is there
-            text = episode_text(int(number) if number.isdecimal() else 1, self._session)
-            return encode_header(stamp_ns, text)
-        if topic is topics.CONFIGURATION:
-            content = {**json.loads(decode_string(raw)), "session": self._session}
-            return encode_string(json.dumps(content, allow_nan=False))
-        return raw
+        message = typed.decode(raw, topic.type_name)
+        message.header.frame_id = self._session
+        return typed.encode(message)
 
 
 def tick_topics(recording: Recording) -> list[Topic]:

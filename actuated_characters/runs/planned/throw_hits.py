@@ -10,8 +10,8 @@ from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.arrays import FloatArray
 from sim_node.physics.balls.sphere_sweep import BallAndCharacter
+from sim_node.physics.engine import World, make_world
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 from sim_node.simulation_factory import make_simulation_settings
 
 _LEAST_CHANGE = 1e-3  # m/s, of a ball's velocity in a tick beside that without the character
@@ -61,10 +61,10 @@ def find_hit(
     """
     settings = make_simulation_settings(plan.simulator)
     step = 1.0 / settings.rate_hz
-    with World(settings.world) as alone, World(WorldSettings(ground=False)) as world:
+    with make_world(settings.world) as alone, make_world(WorldSettings(ground=False)) as world:
         both = BallAndCharacter(world, plan.character, in_order[ball].throw.radius)
         for number, (position, motion) in enumerate(states, start=1):
-            for planned in in_order[len(alone.balls.numbers) : len(motion)]:
+            for planned in in_order[len(alone.balls.throws) : len(motion)]:
                 alone.balls.add(planned.throw)
             before, expected = _step_alone(alone, settings.substeps)
             alone.balls.set_motion(motion)

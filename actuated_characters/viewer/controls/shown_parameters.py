@@ -30,7 +30,7 @@ class ShownParameter:
 
 
 _LAW = (
-    ShownParameter("law", "Law", options=tuple(LAWS)),
+    ShownParameter("law", "Law", options=LAWS.names),
     ShownParameter("gain_scale.p", "Stiffness ×", range=(0.0, 3.0, 0.05)),
     ShownParameter("gain_scale.d", "Damping ×", range=(0.0, 3.0, 0.05)),
     ShownParameter(

@@ -12,7 +12,7 @@ from controller_node.behaviours.state_machine.file import read_machine
 from controller_node.behaviours.state_machine.legs.leg import make_leg, standing_frames
 from controller_node.behaviours.state_machine.machine import MachineKit, StateMachine
 from controller_node.behaviours.state_machine.pose import PoseMaker
-from controller_node.control_laws import LawSettings
+from controller_node.controller_settings import LawSettings
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.base import Motion
 from controller_node.references.factory import MotionSettings

@@ -4,12 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller_node.planner.compiled import mass_matrix
 from controller_node.planner.compiled.decorator import compiled
 from controller_node.planner.compiled.law import Joints
-from controller_node.planner.compiled.mass_matrix import Tree
-from controller_node.planner.compiled.rotations import axes, quaternion, to_parent, turn_between
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled import mass_matrix
+from msgs_config.compiled.mass_matrix import Tree
+from msgs_config.compiled.rotations import axes, quaternion, to_parent, turn_between
 
 
 class Watched(NamedTuple):

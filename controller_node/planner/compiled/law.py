@@ -6,11 +6,11 @@ The same equation as the controller's: what is foreseen is what the controller w
 import math
 from typing import NamedTuple
 
-from controller_node.planner.compiled import mass_matrix
 from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
-from controller_node.planner.compiled.rotations import quaternion, turn_between
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled import mass_matrix
+from msgs_config.compiled.mass_matrix import MassMatrix, Tree
+from msgs_config.compiled.rotations import quaternion, turn_between
 
 
 class Joints(NamedTuple):

@@ -8,19 +8,21 @@ import numpy as np
 from controller_node.planner.compiled.decorator import compiled
 from controller_node.planner.compiled.features import Watched, write_features
 from controller_node.planner.compiled.law import Joints, LawGains, Room, add_errors, stable_pd
-from controller_node.planner.compiled.mass_matrix import MassMatrix, Tree
-from controller_node.planner.compiled.mujoco_functions import step_after_forces, step_before_forces
-from controller_node.planner.compiled.soft_limits import (
-    MOST_BOUNDS,
+from controller_node.references.offsets import knot_before
+from msgs_config.arrays import FloatArray
+from msgs_config.compiled.mass_matrix import MassMatrix, Tree
+from msgs_config.compiled.mujoco_functions import step_after_forces, step_before_forces
+from msgs_config.compiled.soft_limits import (
     PassedBounds,
     SoftLimits,
     add_soft_limits,
+    room_for_bounds,
 )
-from controller_node.references.offsets import knot_before
-from msgs_config.arrays import FloatArray
 
 _knot_before = compiled(knot_before)
+_room_for_bounds = compiled(room_for_bounds)
 
+_MOST_BOUNDS = 32  # of soft limits that are passed at once
 _MAX_SPEED = 1e3  # rad/s or m/s; what is faster has diverged
 
 
@@ -84,7 +86,7 @@ def roll_out(
     """
     n = len(start_velocity)
     room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
-    bounds = _room_for_bounds(n)
+    bounds = _room_for_bounds(_MOST_BOUNDS, n)
     _begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1
     for tick in range(ticks + 1):
@@ -114,7 +116,7 @@ def let_act(
 
     The engine's position and velocity are the result.
     """
-    bounds = _room_for_bounds(len(start_velocity))
+    bounds = _room_for_bounds(_MOST_BOUNDS, len(start_velocity))
     _begin(start_position, start_velocity, engine)
     for tick in range(len(efforts)):
         step_before_forces(engine.model, engine.data)
@@ -132,21 +134,6 @@ def _begin(position: FloatArray, velocity: FloatArray, engine: EngineBuffers) ->
     engine.position[:] = position
     engine.velocity[:] = velocity
     engine.warm_start[:] = 0.0
-
-
-@compiled
-def _room_for_bounds(n: int) -> PassedBounds:
-    return PassedBounds(
-        np.empty((MOST_BOUNDS, n)),
-        np.empty(MOST_BOUNDS),
-        np.empty(MOST_BOUNDS),
-        np.empty((MOST_BOUNDS, MOST_BOUNDS)),
-        np.empty((MOST_BOUNDS, MOST_BOUNDS + 1)),
-        np.empty(MOST_BOUNDS),
-        np.empty(MOST_BOUNDS, np.bool_),
-        np.empty(MOST_BOUNDS, np.intp),
-        np.empty(n),
-    )
 
 
 @compiled

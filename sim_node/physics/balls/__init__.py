@@ -1,1 +1,1 @@
-"""Balls that are thrown: their bodies, their queue, and how they fly up to a character."""
+"""Balls that are thrown: their queue, and how they fly up to a character."""

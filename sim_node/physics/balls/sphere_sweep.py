@@ -8,8 +8,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.engine import World, make_world
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 
 _TOUCHING_DISTANCE = 1e-6  # m: what is nearer counts as touching
 _MOST_RADII = 20_000.0  # radii of the ball that it may come from at most
@@ -45,7 +45,7 @@ class BallAndCharacter:
         Negative: inside of a link; infinite: the link has no surface.
         """
         self._world.balls.place(0, centre)
-        return self._body.gaps(self._world.balls.numbers[0])
+        return self._body.gaps(0)
 
 
 def find_impact(
@@ -72,7 +72,7 @@ def find_impact(
     """
     names = [one.name for one in character.links]
     row = _row(names, link, radius, distance)
-    with World(WorldSettings(ground=False)) as world:
+    with make_world(WorldSettings(ground=False)) as world:
         both = BallAndCharacter(world, character, radius)
         target = both.put_character(position)[row]
         gaps = both.put_ball(target + distance * origin)

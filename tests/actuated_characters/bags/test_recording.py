@@ -13,7 +13,9 @@ import pytest
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
+from actuated_characters.bags.character_timeline import CharacterTimeline
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
+from actuated_characters.bags.world_timeline import WorldTimeline
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.replay.world import worlds
 from actuated_characters.runs.plan import RunPlan
@@ -490,3 +492,12 @@ def test_states_of_something_else_are_refused(pendulum: Made, tmp_path: Path) ->
 
     with pytest.raises(ActuatedCharactersError, match="elbow"):
         read_recording(write_bag(tmp_path / "bag", messages))
+
+
+@pytest.mark.parametrize("kind", [WorldTimeline, CharacterTimeline])
+def test_what_is_read_of_a_world_or_a_character_is_on_a_topic_of_one(
+    kind: type[WorldTimeline] | type[CharacterTimeline],
+) -> None:
+    named = {each.name: topic for topic in topics.TABLE for each in topic.as_others_name_it}
+
+    assert {named[name].of_world for name in kind.TOPICS} == {kind is WorldTimeline}

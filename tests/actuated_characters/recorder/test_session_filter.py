@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
@@ -12,10 +13,10 @@ from std_msgs.msg import Header, String
 from actuated_characters.recorder.session_filter import Heard, SessionFilter, find_session
 from actuated_characters.recorder.topics import RecordedTopic
 from actuated_characters.replay.players.simulator_outputs import SessionRewriter
-from msgs_config.messages import topics
+from msgs_config.messages import topics, typed
 from msgs_config.messages.joint_state import JointStateEncoder
 from msgs_config.messages.session import ANONYMOUS, episode_text
-from msgs_config.messages.topic import Topic
+from msgs_config.messages.topic import SessionPlace, Topic
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches, encode_wrenches
 from tests.support.ros import joint_state, stamp_ns
 
@@ -138,6 +139,19 @@ def test_a_state_in_another_session_has_the_same_numbers_to_the_bit(
     assert np.array(found.position).tobytes() == values.tobytes()
     assert np.array(found.velocity).tobytes() == values[::-1].tobytes()
     assert len(found.effort) == 0
+
+
+@pytest.mark.parametrize(
+    "topic",
+    [t for t in topics.TABLE if t.session in (SessionPlace.FRAME_ID, SessionPlace.FRAME_ID_IF_ANY)],
+    ids=lambda topic: topic.name,
+)
+def test_all_that_names_a_session_is_said_in_the_new_one(topic: Topic) -> None:
+    own, theirs = (typed.stamped(topic.type_name, 5, session) for session in (ONE, OTHER))
+
+    found = SessionRewriter(ONE).rewrite(topic, typed.encode(theirs))
+
+    assert found == typed.encode(own)
 
 
 def test_what_comes_with_a_state_is_said_in_the_session_too_also_of_older_bags() -> None:

@@ -1,70 +1,38 @@
-"""What is compiled is compiled again when any of its sources changes."""
+"""Every file with compiled functions counts where they are looked for."""
 
 import importlib
-import subprocess
-import sys
 from pathlib import Path
 
+import pytest
 from numba.core.registry import CPUDispatcher as Dispatcher
 
 from controller_node.planner.compiled import decorator, rollout
-from controller_node.planner.compiled.decorator import choose_cache_directory
-
-PROGRAM = """
-import sys
-sys.path.insert(0, {folder!r})
-from pathlib import Path
-from controller_node.planner.compiled import decorator
-decorator._CACHE = decorator.choose_cache_directory(Path({folder!r}).glob("*.py"), {cache!r})
-import outer
-print(outer.outer(1.0))
-"""
-INNER = "from controller_node.planner.compiled.decorator import compiled\n@compiled\n"
-OUTER = INNER + "def outer(x):\n    return inner(x)\n"
+from msgs_config.compiled import decorator as basics
+from msgs_config.compiled.decorator import Compiler
 
 
-def test_each_content_of_the_sources_has_its_directory(tmp_path: Path) -> None:
-    first, second = tmp_path / "a.py", tmp_path / "b.py"
-    first.write_text("1")
-    second.write_text("2")
-    before = choose_cache_directory([first, second], str(tmp_path))
-    assert before == choose_cache_directory([second, first], str(tmp_path))
-    second.write_text("3")
-    after = choose_cache_directory([first, second], str(tmp_path))
-    assert before.parent == after.parent == tmp_path
-    assert before != after
+def test_the_rollouts_are_kept_where_the_planners_sources_count() -> None:
+    assert Path(rollout.roll_out.stats.cache_path).is_relative_to(decorator.compiled.cache)
+    assert decorator.compiled.cache != basics.compiled.cache
 
 
-def test_the_rollouts_are_kept_there() -> None:
-    assert Path(rollout.roll_out.stats.cache_path).is_relative_to(decorator._CACHE)
-
-
-def test_every_compiled_function_is_of_a_source_that_counts() -> None:
-    names = [each.stem for each in Path(decorator.__file__).parent.glob("*.py")]
-    modules = [
-        importlib.import_module(f"controller_node.planner.compiled.{name}")
-        for name in names
-        if name != "__init__"
-    ]
+@pytest.mark.parametrize(
+    ("package", "compiled"),
+    [
+        ("msgs_config.compiled", basics.compiled),
+        ("controller_node.planner.compiled", decorator.compiled),
+    ],
+)
+def test_every_compiled_function_is_of_a_source_that_counts(
+    package: str, compiled: Compiler
+) -> None:
+    folder = Path(str(importlib.import_module(package).__file__)).parent
+    names = [each.stem for each in folder.glob("*.py") if each.stem != "__init__"]
+    modules = [importlib.import_module(f"{package}.{name}") for name in names]
     functions = [
         each for module in modules for each in vars(module).values() if isinstance(each, Dispatcher)
     ]
     files = {Path(each.py_func.__code__.co_filename) for each in functions}
 
     assert len(functions) > 20
-    assert files <= set(decorator.SOURCES)
-
-
-def test_a_change_in_a_callee_of_another_file_counts(tmp_path: Path) -> None:
-    """numba alone would answer with the old callee's code."""
-    folder, cache = tmp_path / "sources", tmp_path / "cache"
-    folder.mkdir()
-    (folder / "outer.py").write_text("from inner import inner\n" + OUTER)
-    printed = []
-    for factor in (2, 3):
-        (folder / "inner.py").write_text(INNER + f"def inner(x):\n    return {factor} * x\n")
-        program = PROGRAM.format(folder=str(folder), cache=str(cache))
-        run = [sys.executable, "-B", "-c", program]
-        printed.append(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
-
-    assert printed == ["2.0\n", "3.0\n"]
+    assert files <= set(compiled.sources)

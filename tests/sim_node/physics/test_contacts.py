@@ -16,10 +16,10 @@ from msgs_config.character.bullet import pybullet
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.body import Body
+from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.simulated_character import Contacts, SimulatedCharacter
 from sim_node.physics.simulation import Simulation
-from sim_node.physics.world import World
 from sim_node.physics.wrenches import ExternalWrench
 from tests.support.physics import (
     character,
@@ -30,7 +30,7 @@ from tests.support.physics import (
 CROWD = {"characters": ["one", "other"], "other.placement": [0.25, 0.1, 0.0, 2.0]}
 
 
-def centres(body: Body) -> dict[int, FloatArray]:
+def centres(body: BulletBody) -> dict[int, FloatArray]:
     """Where the centres of mass of the engine's links are now."""
     client, count = body._client, pybullet.getNumJoints(body._body, physicsClientId=body._client)
     base = pybullet.getBasePositionAndOrientation(body._body, physicsClientId=client)[0]
@@ -43,7 +43,7 @@ def centres(body: Body) -> dict[int, FloatArray]:
     return found
 
 
-def expected_wrenches(body: Body, before: dict[int, FloatArray]) -> FloatArray:
+def expected_wrenches(body: BulletBody, before: dict[int, FloatArray]) -> FloatArray:
     """Net wrenches (links, 6) of the engine's contact points, about where the links were before."""
     wrenches = np.zeros((len(before), 6))
     for point in pybullet.getContactPoints(physicsClientId=body._client):
@@ -131,13 +131,13 @@ def test_of_several_characters_each_has_its_own_also_if_one_alone_is_read() -> N
 
 def test_who_reads_none_looks_for_none(monkeypatch: pytest.MonkeyPatch) -> None:
     looked = []
-    find = World._find_touched
+    find = BulletWorld._find_touched
 
-    def counted(world: World) -> object:
+    def counted(world: BulletWorld) -> object:
         looked.append(world)
         return find(world)
 
-    monkeypatch.setattr(World, "_find_touched", counted)
+    monkeypatch.setattr(BulletWorld, "_find_touched", counted)
     with simulation("humanoid") as run:
         run.watches_contacts = True
         for _ in range(5):

@@ -18,9 +18,9 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from sim_node.physics.body import Body
+from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,
@@ -255,14 +255,9 @@ def at_height(z: float, x: float = 0.0) -> FloatArray:
     return np.array([x, 0.0, z, 0.0, 0.0, 0.0])
 
 
-def contact_wrenches(world: World, body: Body, centres: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Contact wrenches (links, 6) of the last step, about the centres of mass before."""
-    return body.contact_wrenches(world.touched_links(), centres)
-
-
-def contact_forces(world: World, body: Body) -> tuple[FloatArray, BoolArray]:
+def contact_forces(body: BulletBody) -> tuple[FloatArray, BoolArray]:
     """Contact forces (links, 3) of the last step."""
-    wrenches, touching = contact_wrenches(world, body, body.centres())
+    wrenches, touching = body.contact_wrenches()
     return wrenches[:, :3], touching
 
 
@@ -276,8 +271,8 @@ def about_origin(wrenches: FloatArray, centres: FloatArray) -> FloatArray:
 def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
     with LoneWorld(box, WorldSettings(gravity=0.0)) as world:
         world.body.set_state(at_height(0.1 + gap), np.zeros(6))
-        world.step()
-        forces, touching = contact_forces(world, world.body)
+        advance(world, np.zeros(6))
+        forces, touching = contact_forces(world.body)
 
     np.testing.assert_array_equal(forces, np.zeros((1, 3)))
     assert not touching.any()
@@ -288,7 +283,7 @@ def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character) -> None:
         world.body.set_state(at_height(0.1), np.zeros(6))
 
         advance(world, np.zeros(6), 480)
-        forces, touching = contact_forces(world, world.body)
+        forces, touching = contact_forces(world.body)
 
     np.testing.assert_allclose(forces, [[0.0, 0.0, BOX_MASS * 9.81]], rtol=0.0, atol=1e-9)
     assert touching.all()
@@ -308,7 +303,7 @@ def test_contacts_and_gravity_are_all_that_changes_the_momentum_of_a_tumbling_bo
             centres = world.body.centres()
 
             advance(world, np.zeros(6))
-            wrenches, _ = contact_wrenches(world, world.body, centres)
+            wrenches, _ = world.body.contact_wrenches()
 
             # Newton's and Euler's law, about the world's origin
             rate = (np.concatenate(momentum(world.body, box)) - before) / step_s
@@ -325,7 +320,7 @@ def test_two_boxes_that_collide_press_equally_in_opposite_directions(
 ) -> None:
     # one falls aslant onto the other's corner, and neither has weight
     step_s, touched = 1.0 / 240.0, 0
-    with World(WorldSettings(gravity=0.0, ground=False)) as world:
+    with BulletWorld(WorldSettings(gravity=0.0, ground=False)) as world:
         resting, coming = [world.add(box), world.add(box)][::order]
         resting.set_state(np.zeros(6), np.zeros(6))
         coming.set_state(
@@ -334,8 +329,10 @@ def test_two_boxes_that_collide_press_equally_in_opposite_directions(
         for _ in range(60):
             before = momenta(box, resting, coming)
 
+            for body in (resting, coming):
+                body.apply(np.zeros(6))
             world.step()
-            forces = [contact_forces(world, body)[0][0] for body in (resting, coming)]
+            forces = [contact_forces(body)[0][0] for body in (resting, coming)]
 
             # Newton's third law, and his second for each
             rates = (momenta(box, resting, coming) - before) / step_s
@@ -345,7 +342,7 @@ def test_two_boxes_that_collide_press_equally_in_opposite_directions(
     assert touched
 
 
-def momenta(whole: Character, *bodies: Body) -> FloatArray:
+def momenta(whole: Character, *bodies: BulletBody) -> FloatArray:
     """Linear momentum (bodies, 3) of each body, N s."""
     return np.array([momentum(body, whole)[0] for body in bodies])
 
@@ -353,7 +350,7 @@ def momenta(whole: Character, *bodies: Body) -> FloatArray:
 RawState = tuple[Any, Any, Any]
 
 
-def raw_state(body: Body) -> RawState:
+def raw_state(body: BulletBody) -> RawState:
     """The engine's own state of a body: base pose, base velocity, joints."""
     client = {"physicsClientId": body._client}
     return (
@@ -363,7 +360,7 @@ def raw_state(body: Body) -> RawState:
     )
 
 
-def put_raw_state(body: Body, pose: RawState, motion: RawState) -> None:
+def put_raw_state(body: BulletBody, pose: RawState, motion: RawState) -> None:
     """Put a body into the pose of one state with the velocities of another."""
     client = {"physicsClientId": body._client}
     pybullet.resetBasePositionAndOrientation(body._body, *pose[0], **client)
@@ -424,7 +421,7 @@ def test_the_contact_wrenches_of_a_falling_humanoid_are_what_changes_its_momentu
             before, centres = raw_state(world.body), world.body.centres()
 
             advance(world, np.zeros(whole.layout.size))
-            wrenches, touching = contact_wrenches(world, world.body, centres)
+            wrenches, touching = world.body.contact_wrenches()
 
             expected = untouched.wrench(before, raw_state(world.body))
             total = about_origin(wrenches, centres)
@@ -459,8 +456,8 @@ def test_a_contact_is_the_links_own_whatever_the_order_of_the_urdf(tmp_path: Pat
     with LoneWorld(whole, WorldSettings()) as world:
         world.body.set_state(at_height(0.549), np.zeros(6))
 
-        world.step()
-        forces, touching = contact_forces(world, world.body)
+        advance(world, np.zeros(6))
+        forces, touching = contact_forces(world.body)
 
     assert [link.name for link in whole.links] == ["base", "left", "foot", "right"]
     np.testing.assert_array_equal(touching, [False, False, True, False])
@@ -477,7 +474,7 @@ def test_contacts_inside_a_character_cancel() -> None:
         world.body.set_state(np.array(whole.rest_position), np.zeros(whole.layout.size))
         for _ in range(120):
             advance(world, effort)
-            forces, touching = contact_forces(world, world.body)
+            forces, touching = contact_forces(world.body)
 
             largest = np.abs(forces).max()
             pressed += bool(largest > 10.0)

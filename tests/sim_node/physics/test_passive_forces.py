@@ -17,16 +17,12 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, Joint, SoftLimit
 from msgs_config.clips.reading import available_clips, read_clip
+from msgs_config.compiled import soft_limits
 from msgs_config.geometry import rotations
-from sim_node.physics.passive_forces import (
-    PassedBound,
-    PassiveForces,
-    closest_rotation_vector,
-    complementary_forces,
-)
+from sim_node.physics.engine import make_world
+from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.world import World
 from tests.support.hands import box_link, hinge
 from tests.support.physics import (
     character,
@@ -34,6 +30,7 @@ from tests.support.physics import (
     random_state,
     without_self_collision,
 )
+from tests.support.soft_limits import soft_limit_effort
 
 PROPERTY = settings(deadline=None)
 HUMANOID = character("humanoid")
@@ -174,7 +171,7 @@ def test_a_limb_that_is_swung_against_its_limit_is_stopped_and_gains_no_energy(
     position[entries.start + axis] = limit.upper[axis] - 0.02
     velocity[entries.start + axis] = 4.0
     stored, energies, touched = [], [], 0
-    with World(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
+    with make_world(WorldSettings(step_s=STEP, gravity=0.0, ground=False)) as world:
         body = world.add(without_self_collision("humanoid"))
         body.set_state(position, velocity)
         for tick in range(240):
@@ -238,6 +235,18 @@ def test_a_limb_about_to_pass_its_bound_is_slowed_in_the_step_before() -> None:
     assert not torque(passive, ball, turn - 1.1 * STEP * speed, speed).any()
 
 
+def complementary_forces(
+    explicit: FloatArray, implicit: FloatArray, delassus: FloatArray
+) -> FloatArray:
+    """The forces (m,) of bounds of which each acceleration (m, m) by each force is known."""
+    room = soft_limits.room_for_bounds(len(explicit), 3)
+    room.explicit[:] = explicit
+    room.coupling[:] = implicit[:, np.newaxis] * delassus
+    soft_limits.find_complementary_forces(len(explicit), room)
+    forces: FloatArray = np.maximum(room.forces, 0.0)
+    return forces
+
+
 @PROPERTY
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
 def test_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: int) -> None:
@@ -245,9 +254,8 @@ def test_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: in
     root = rng.normal(size=(size, size))
     delassus = root @ root.T + np.eye(size)
     explicit, implicit = rng.uniform(0.1, 3.0, size), rng.uniform(0.0, 10.0, size)
-    bounds = [PassedBound((0.0, 0.0, 0.0), *pair) for pair in zip(explicit, implicit, strict=True)]
 
-    forces = complementary_forces(bounds, delassus)
+    forces = complementary_forces(explicit, implicit, delassus)
 
     # complementarity, to rounding
     lacking = explicit - implicit * (delassus @ forces) - forces
@@ -259,9 +267,8 @@ def test_forces_push_or_are_zero_where_nothing_is_to_be_held(seed: int, size: in
 def test_of_two_bounds_that_push_one_another_away_only_one_pushes() -> None:
     """A unit of the first force moves the second bound's joint back far more than is wanted."""
     delassus = np.array([[1.0, 4.0], [4.0, 17.0]])
-    bounds = [PassedBound((1.0, 0.0, 0.0), 10.0, 1.0), PassedBound((0.0, 1.0, 0.0), 1.0, 1.0)]
 
-    forces = complementary_forces(bounds, delassus)
+    forces = complementary_forces(np.array([10.0, 1.0]), np.ones(2), delassus)
 
     assert forces.tolist() == [5.0, 0.0]
 
@@ -271,13 +278,28 @@ def test_the_way_round_that_counts_is_the_one_nearer_to_the_bounds(ball: Joint) 
     rng = np.random.default_rng(2)
     for _ in range(100):
         turn = random_rotation_vector(rng)
-        chosen = np.array(closest_rotation_vector(turn.tolist(), limit_of(ball)))
+        limit = limit_of(ball)
+        lower, upper = np.array(limit.lower), np.array(limit.upper)
+        chosen = np.array(soft_limits.nearer_to(tuple(turn.tolist()), lower, upper))
 
         apart = np.sum(excess(limit_of(ball), chosen) ** 2)
         assert 0.5 * limit_of(ball).stiffness * apart == pytest.approx(
             potential(limit_of(ball), turn)
         )
         assert rotations.angle_between(rotations.exp(chosen), rotations.exp(turn)) < 1e-7
+
+
+def test_the_effort_has_the_bits_of_the_one_in_plain_python() -> None:
+    rng, compared = np.random.default_rng(3), 0
+    passive, model = make_passive_forces(HUMANOID, STEP), DynamicsModel(HUMANOID, 0.0)
+    for _ in range(300):
+        position, velocity = random_state(HUMANOID, rng)
+        found = passive.effort(position, velocity, np.zeros(LAYOUT.size))
+        expected = soft_limit_effort(HUMANOID, model, STEP, position, velocity)
+        compared += np.count_nonzero(expected)
+        np.testing.assert_array_equal(found, expected)
+
+    assert compared > 1000  # entries that some limit acts on
 
 
 def test_the_soft_limits_leave_a_tenth_of_a_radian_to_every_frame_of_every_clip() -> None:
@@ -365,7 +387,7 @@ def test_a_damper_far_too_strong_for_an_explicit_step_sinks_as_it_should() -> No
     # at d much larger than I / h gravity's torque moves it by m g r / d
     whole = damped(character("pendulum"), 1e4)
     passive = PassiveForces(whole, STEP, 9.81)
-    with World(WorldSettings(step_s=STEP)) as world:
+    with make_world(WorldSettings(step_s=STEP)) as world:
         body = world.add(whole)
         body.set_state(np.array([0.5]), np.array([3.0]))
         for _ in range(5):

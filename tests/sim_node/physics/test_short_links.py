@@ -14,7 +14,7 @@ from msgs_config.character.file import shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.messages.state import StampedState
-from sim_node.physics.engine_defaults import UNLIMITED_SPEED
+from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.short_links import short_joints, speed_bounds
 from tests.support.hands import box_link, hand_on_a_body, hinge
 from tests.support.physics import TURNED_FRAMES, character

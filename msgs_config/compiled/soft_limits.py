@@ -1,35 +1,48 @@
-"""The simulator's soft limits of ball joints (`sim_node.physics.passive_forces`) in compiled code.
+"""Soft limits of ball joints: forces f >= 0 against bounds that are passed, implicit in a step h.
 
-Forces f >= 0 against bounds that are passed, implicit in a step h: `f = max(0, e - i A f)` with
-`A = J M^-1 J^T`. The equations and their sources are there.
+A soft limit is a spring and a damper outside of bounds on the components of a joint's rotation
+vector r. With e the excess of a component over its bound, the force against it is
+`f = k e + c de/dt`, and never one that draws it further out. As `dr/dt = J w`, with w the angular
+velocity in the child frame and J the inverse of the right Jacobian of SO(3), its torque in the
+child frame is `-J^T f`. The spring's potential is `V = k/2 e^2`; the damper only takes energy.
+
+A limb is light, and a spring that stops it in a few degrees is far too stiff to be explicit. So e
+and de/dt are those at the end of the engine's step h, with the velocity that the forces lead to:
+`f = k (e + h u) + c u`, `u = de/dt - h A f`, where `A = J M^-1 J^T` of all bounds together. That is
+stable for any k and c at any h (implicit Euler; as Tan, Liu and Turk 2011 do it for control), and
+as h goes to zero it is the law above. Other forces on the limb are not foreseen.
+
+Of the two rotation vectors of a turn, r and the longer way round, the one nearer to the bounds
+counts, so that nothing jumps where r does, at an angle of pi.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from controller_node.planner.compiled import mass_matrix
-from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.mass_matrix import MassMatrix
-from controller_node.planner.compiled.rotations import (
+import numpy as np
+
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
+from msgs_config.character.model import SoftLimit
+from msgs_config.compiled import mass_matrix
+from msgs_config.compiled.decorator import compiled
+from msgs_config.compiled.mass_matrix import MassMatrix
+from msgs_config.compiled.rotations import (
     quaternion,
     right_jacobian_inverse,
     rotation_vector,
     to_parent,
 )
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.geometry.scalars import Quaternion, Vector
 
-MOST_BOUNDS = 32
-"""More that are passed at once are left out."""
-
 _MOST_PIVOTS = 50
-_ROUNDING = 1e-12
+_ROUNDING = 1e-12  # share of a force that may be wrong without consequence
 
 
 class SoftLimits(NamedTuple):
     """Bounds of k ball joints' rotation vectors."""
 
-    positions: IntArray  # (k,) where each joint's quaternion begins
+    positions: IntArray  # (k,) where each joint begins in a position
     velocities: IntArray  # (k,) where its angular velocity begins
     lower: FloatArray  # (k, 3) rad
     upper: FloatArray  # (k, 3) rad
@@ -39,7 +52,10 @@ class SoftLimits(NamedTuple):
 
 
 class PassedBounds(NamedTuple):
-    """Room for the bounds that are passed in a step, and for what follows of them."""
+    """Room for m bounds that are passed in a step, and for what follows of them.
+
+    More that are passed at once are left out.
+    """
 
     rows: FloatArray  # (m, n) of J, outwards
     explicit: FloatArray  # (m,) N m, the force if nothing yielded
@@ -50,6 +66,38 @@ class PassedBounds(NamedTuple):
     pushing: BoolArray  # (m,)
     chosen: IntArray  # (m,)
     column: FloatArray  # (n,)
+
+
+def make_soft_limits(
+    limits: Sequence[SoftLimit], positions: Sequence[int], velocities: Sequence[int]
+) -> SoftLimits:
+    """The bounds of joints that begin at these entries of a position and of a velocity."""
+    lower = np.array([limit.lower for limit in limits], dtype=float).reshape(-1, 3)
+    upper = np.array([limit.upper for limit in limits], dtype=float).reshape(-1, 3)
+    return SoftLimits(
+        np.array(positions, dtype=np.intp),
+        np.array(velocities, dtype=np.intp),
+        lower,
+        upper,
+        np.minimum(-lower, upper).min(axis=1, initial=np.inf),
+        np.array([limit.stiffness for limit in limits], dtype=float),
+        np.array([limit.damping for limit in limits], dtype=float),
+    )
+
+
+def room_for_bounds(most: int, entries: int) -> PassedBounds:
+    """Room for so many passed bounds of a character with n entries."""
+    return PassedBounds(
+        np.empty((most, entries)),
+        np.empty(most),
+        np.empty(most),
+        np.empty((most, most)),
+        np.empty((most, most + 1)),
+        np.empty(most),
+        np.empty(most, dtype=np.bool_),
+        np.empty(most, dtype=np.intp),
+        np.empty(entries),
+    )
 
 
 @compiled
@@ -64,15 +112,16 @@ def add_soft_limits(
 ) -> None:
     """Add to an effort (n,) what the soft limits do in a state, over a period in s.
 
-    `mass` is the mass matrix in the state, factorised.
+    `position` (q,) has quaternions wxyz. `mass` is the mass matrix in the state, factorised.
     """
     count = 0
     for joint in range(len(limits.positions)):
-        count = _find_passed(joint, position, velocity, period, limits, room, count)
-    if not count:
-        return
-    _couple(count, mass, room)
-    _find_forces(count, room)
+        spin = _spin(joint, velocity, limits)
+        turned = quaternion(position, limits.positions[joint])
+        if not is_less(turned, limits.free[joint] - _reach(spin, period)):
+            turn = rotation_vector(turned)
+            count = _add_passed(joint, turn, spin, period, limits, room, count)
+    find_forces(count, mass, room)
     for bound in range(count):
         force = max(room.forces[bound], 0.0)
         for entry in range(len(effort)):
@@ -80,32 +129,62 @@ def add_soft_limits(
 
 
 @compiled
-def _find_passed(
-    joint: int,
+def find_passed(
     position: FloatArray,
     velocity: FloatArray,
+    period: float,
+    limits: SoftLimits,
+    room: PassedBounds,
+) -> int:
+    """Find the bounds that a state is beyond, or will pass in a period in s; how many there are.
+
+    Position (n,) in message form, with rotation vectors.
+    """
+    count = 0
+    for joint in range(len(limits.positions)):
+        first = limits.positions[joint]
+        turn = (position[first], position[first + 1], position[first + 2])
+        spin = _spin(joint, velocity, limits)
+        count = _add_passed(joint, turn, spin, period, limits, room, count)
+    return count
+
+
+@compiled
+def _spin(joint: int, velocity: FloatArray, limits: SoftLimits) -> Vector:
+    first = limits.velocities[joint]
+    return velocity[first], velocity[first + 1], velocity[first + 2]
+
+
+@compiled
+def _reach(spin: Vector, period: float) -> float:
+    """How far a rotation vector may get in a period: less than twice as far as its joint turns.
+
+    That holds up to two thirds of a turn.
+    """
+    return 2.0 * period * math.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
+
+
+@compiled
+def _add_passed(
+    joint: int,
+    turn: Vector,
+    spin: Vector,
     period: float,
     limits: SoftLimits,
     room: PassedBounds,
     count: int,
 ) -> int:
     """Add the bounds that a joint is beyond or about to pass; how many there are with them."""
-    first = limits.velocities[joint]
-    spin = (velocity[first], velocity[first + 1], velocity[first + 2])
     lower, upper = limits.lower[joint], limits.upper[joint]
-    turned = quaternion(position, limits.positions[joint])
-    reach = 2.0 * period * math.sqrt(spin[0] * spin[0] + spin[1] * spin[1] + spin[2] * spin[2])
-    if is_less(turned, limits.free[joint] - reach):
+    if not _is_near(turn, lower, upper, _reach(spin, period)):
         return count
-    turn = rotation_vector(turned)
-    if not _is_near(turn, lower, upper, reach):
-        return count
-    turn = _nearer_to(turn, lower, upper)
+    turn = nearer_to(turn, lower, upper)
     jacobian = right_jacobian_inverse(turn)
     rates = to_parent(jacobian, spin)
     stiffness, damping = limits.stiffness[joint], limits.damping[joint]
+    first = limits.velocities[joint]
     for i in range(3):
-        if count == MOST_BOUNDS:
+        if count == len(room.explicit):
             break
         outward = math.copysign(1.0, 2.0 * (turn[i] + period * rates[i]) - lower[i] - upper[i])
         excess = outward * (turn[i] - (upper[i] if outward > 0.0 else lower[i]))
@@ -139,7 +218,7 @@ def _is_near(turn: Vector, lower: FloatArray, upper: FloatArray, reach: float) -
 
 
 @compiled
-def _nearer_to(turn: Vector, lower: FloatArray, upper: FloatArray) -> Vector:
+def nearer_to(turn: Vector, lower: FloatArray, upper: FloatArray) -> Vector:
     """Of a rotation vector and the longer way round the one nearer to the bounds."""
     x, y, z = turn
     angle = math.sqrt(x * x + y * y + z * z)
@@ -161,6 +240,17 @@ def _squared_excess(turn: Vector, lower: FloatArray, upper: FloatArray) -> float
 
 
 @compiled
+def find_forces(count: int, mass: MassMatrix, room: PassedBounds) -> None:
+    """Find the forces, not negative but for rounding, of so many bounds that were passed.
+
+    `mass` is the mass matrix in the state, factorised.
+    """
+    if count:
+        _couple(count, mass, room)
+        find_complementary_forces(count, room)
+
+
+@compiled
 def _couple(count: int, mass: MassMatrix, room: PassedBounds) -> None:
     """Work out how the bounds' forces take from each other: the implicit share times A."""
     for j in range(count):
@@ -173,8 +263,13 @@ def _couple(count: int, mass: MassMatrix, room: PassedBounds) -> None:
 
 
 @compiled
-def _find_forces(count: int, room: PassedBounds) -> None:
-    """Find forces that push and never draw, by principal pivoting (Murty 1974)."""
+def find_complementary_forces(count: int, room: PassedBounds) -> None:
+    """Find forces that push and never draw: `f = max(0, explicit - coupling f)`.
+
+    With all bounds pushing it is one linear system. A bound that would draw leaves it, one that
+    lacks a push enters, the first such one at a time: that finds the one solution (Murty 1974,
+    "Note on a Bard-type Scheme for Solving the Complementarity Problem").
+    """
     room.pushing[:count] = True
     for _ in range(_MOST_PIVOTS):
         _solve_for_pushing(count, room)
@@ -202,7 +297,10 @@ def _first_wrong(count: int, room: PassedBounds) -> int:
 
 @compiled
 def _solve_for_pushing(count: int, room: PassedBounds) -> None:
-    """The forces of the bounds that push, `(1 + coupling) f = explicit`; the others' are zero."""
+    """The forces of the bounds that push, `(1 + coupling) f = explicit`; the others' are zero.
+
+    By elimination; the matrix is similar to a positive definite one, so no pivots are looked for.
+    """
     size, system = 0, room.system
     for i in range(count):
         room.forces[i] = 0.0

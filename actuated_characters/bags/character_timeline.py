@@ -1,4 +1,4 @@
-"""Collects the messages of a bag on one character or one world, as arrays that grow."""
+"""Collects the messages of a bag on one character, as arrays that grow."""
 
 import json
 from array import array
@@ -12,8 +12,9 @@ import numpy as np
 from actuated_characters.bags.node_parameters import NodeParameters, SimulatorConfigurations
 from actuated_characters.bags.plans import PlanArrays, decode_plan
 from actuated_characters.bags.rebuilding import Rebuilt
+from actuated_characters.bags.world_timeline import Beginnings
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.errors import CommandError, LayoutError, MessageError, RecordingError
+from msgs_config.errors import LayoutError, MessageError, RecordingError
 from msgs_config.memory import is_own
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode_string
@@ -21,9 +22,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.keyframe import decode_keyframe
-from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
-from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.shared_parameters import RATE
 
@@ -32,7 +31,6 @@ _CONTROLLER = topics.CONFIGURATION.of(topics.CONTROLLER_NODE).name
 _MODE = topics.MODE.of(topics.CONTROLLER_NODE).name
 _PLAN = topics.PLAN.of(topics.CONTROLLER_NODE).name
 _REFERENCE = topics.REFERENCE.of(topics.CONTROLLER_NODE).name
-_KEYFRAME = topics.KEYFRAME.of(topics.SIM_NODE).name
 _CONTROLLER_KEYFRAME = topics.CONTROLLER_KEYFRAME.of(topics.CONTROLLER_NODE).name
 _UNREADABLE_JSON = (ValueError, KeyError, TypeError, RecursionError)  # raised for foreign JSON
 _MOST_EARLY = 50_000  # messages before the configuration, which is latched and comes first
@@ -76,63 +74,12 @@ class States:
         return np.frombuffer(getattr(self, name)).reshape(len(self.stamps_ns), size)
 
 
-@dataclass
-class Beginnings:
-    """The states with which recordings of a bag may begin, beside the first ones of episodes."""
-
-    first_ns: int = 0  # stamp before which none begins
-    keyframes: set[int] = field(default_factory=set)  # their stamps so far
-
-
-class WorldTimeline:
-    """All messages on the balls in one namespace."""
-
-    TOPICS: ClassVar = topics.names_to_read(of_world=True)
-
-    def __init__(self, namespace: str, begins: Beginnings) -> None:
-        """`namespace` is without the leading slash; `begins` gets the keyframes' stamps."""
-        self.namespace = namespace
-        self.has_wall_times = True
-        self.keyframes: dict[int, bytes] = {}  # serialised, by stamp
-        self._begins = begins
-        # by the stamp of the state after the tick in which they begin
-        self.throws: dict[int, tuple[ProjectileThrow, ...]] = {}
-        self.balls: dict[int, BallStates] = {}  # by stamp
-        self.throws_sent = 0
-        self._codec = ThrowCodec()
-
-    def take(self, name: str, raw: bytes, published_ns: int) -> None:
-        """Take a message on one of `TOPICS`.
-
-        Raises:
-            MessageError: it is no message of the topic's type and meaning.
-        """
-        if name == topics.THROW.name:
-            self.throws_sent += 1
-        elif name == _KEYFRAME:
-            keyframe = decode_keyframe(raw)
-            if is_own(keyframe.memory):
-                self.keyframes[keyframe.stamp_ns] = raw
-                self._begins.keyframes.add(keyframe.stamp_ns)
-        elif name == topics.THROWN.name:
-            balls = decode_balls(raw)
-            self.balls[balls.stamp_ns] = balls
-        else:
-            try:
-                stamp_ns, throw = self._codec.decode(raw)
-            except CommandError as error:
-                raise MessageError(f"'{name}' has a throw that cannot be: {error}") from error
-            self.throws[stamp_ns] = (*self.throws.get(stamp_ns, ()), throw)
-
-
 class CharacterTimeline:
     """All messages on one character, which is in one namespace.
 
     The simulator's configuration says what a message means; messages before it are kept until it
     comes. States before the first one of an episode, or of a keyframe, are left out.
     """
-
-    TOPICS: ClassVar = topics.names_to_read(of_world=False)
 
     def __init__(self, namespace: str, begins: Beginnings) -> None:
         """`namespace` is without the leading slash; `begins` has the keyframes' stamps so far."""
@@ -141,10 +88,8 @@ class CharacterTimeline:
         self.has_wall_times = True  # False: times of publishing are simulated log times
         self.simulator = SimulatorConfigurations(namespace)
         self.states, self.references = States(), States()
-        self.wrenches: dict[str, dict[int, WrenchArrays]] = {  # by topic and stamp
-            topics.CONTACTS.name: {},
-            topics.APPLIED_WRENCH.name: {},
-        }
+        self.contacts: dict[int, WrenchArrays] = {}  # by stamp
+        self.applied: dict[int, WrenchArrays] = {}  # by stamp, the pushes that acted
         self.commands: dict[int, list[CommandArrays]] = {}  # by stamp
         self.controller: list[NodeParameters] = []
         self.modes: list[ModeChange] = []
@@ -159,15 +104,6 @@ class CharacterTimeline:
         self.repeated = 0  # states that came again, as in a pause
         self._last_tick = 0
         self._decoder, self._references, self._commands = (JointStateDecoder() for _ in range(3))
-        self._take: dict[str, Callable[[bytes, int], None]] = {
-            topics.JOINT_STATES.name: self._take_state,
-            topics.JOINT_TORQUES.name: self._take_command,
-            _REFERENCE: self._take_reference,
-            _CONTROLLER: self._take_controller,
-            _MODE: self._take_mode,
-            _PLAN: self._take_plan,
-            _CONTROLLER_KEYFRAME: self._take_keyframe,
-        }
 
     @property
     def skipped_states(self) -> int:
@@ -185,19 +121,12 @@ class CharacterTimeline:
         Raises:
             ActuatedCharactersError: it is no message of the topic's type and meaning.
         """
-        if name == CONFIGURATION:
-            self._configure(raw)
-        elif self.rebuilt is None and len(self._early) < _MOST_EARLY:
+        if self.rebuilt is not None or name == CONFIGURATION:
+            self._TAKERS[name](self, raw, published_ns)
+        elif len(self._early) < _MOST_EARLY:
             self._early.append((name, raw, published_ns))
-        elif self.rebuilt is None:
-            self._early_lost = True
-        elif name in self.wrenches:
-            wrenches = decode_wrenches(raw)
-            self.wrenches[name][wrenches.stamp_ns] = wrenches
-        elif name == topics.EXTERNAL_WRENCH.name:
-            self.pushes_sent += 1
         else:
-            self._take[name](raw, published_ns)
+            self._early_lost = True
 
     def finish(self) -> Rebuilt:
         """Check that there are states of each tick; return their character.
@@ -222,7 +151,7 @@ class CharacterTimeline:
         self.simulator.check_start(self.states.stamps_ns[0])
         return self.rebuilt
 
-    def _configure(self, raw: bytes) -> None:
+    def _take_configuration(self, raw: bytes, published_ns: int) -> None:
         is_first = self.rebuilt is None
         if is_first and self._early_lost:
             raise RecordingError(f"'{CONFIGURATION}' comes only after {_MOST_EARLY} other messages")
@@ -276,6 +205,17 @@ class CharacterTimeline:
         if row >= 0 and not self.gaps and content != known:
             raise RecordingError(f"two states of tick {tick}; was its simulator restarted?")
 
+    def _take_push(self, raw: bytes, published_ns: int) -> None:
+        self.pushes_sent += 1
+
+    def _take_contacts(self, raw: bytes, published_ns: int) -> None:
+        contacts = decode_wrenches(raw)
+        self.contacts[contacts.stamp_ns] = contacts
+
+    def _take_applied(self, raw: bytes, published_ns: int) -> None:
+        applied = decode_wrenches(raw)
+        self.applied[applied.stamp_ns] = applied
+
     def _take_reference(self, raw: bytes, published_ns: int) -> None:
         state = state_in_layout(self._layout, self._references.decode(raw))
         references = self.references
@@ -320,3 +260,18 @@ class CharacterTimeline:
             change = ModeChange(int(facts.pop("stamp_ns")), str(facts.pop("mode")), facts)
             if change not in self.modes[-1:]:  # a latched message comes again to each new listener
                 self.modes.append(change)
+
+    _TAKERS: ClassVar[dict[str, Callable[["CharacterTimeline", bytes, int], None]]] = {
+        CONFIGURATION: _take_configuration,
+        topics.JOINT_STATES.name: _take_state,
+        topics.JOINT_TORQUES.name: _take_command,
+        topics.EXTERNAL_WRENCH.name: _take_push,
+        topics.APPLIED_WRENCH.name: _take_applied,
+        topics.CONTACTS.name: _take_contacts,
+        _REFERENCE: _take_reference,
+        _CONTROLLER: _take_controller,
+        _CONTROLLER_KEYFRAME: _take_keyframe,
+        _MODE: _take_mode,
+        _PLAN: _take_plan,
+    }
+    TOPICS: ClassVar = tuple(_TAKERS)

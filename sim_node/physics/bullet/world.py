@@ -1,4 +1,4 @@
-"""The physics world: PyBullet behind one class; the only place that steps the engine."""
+"""Bullet's world: PyBullet behind one class; the only place that steps it."""
 
 import tempfile
 from collections import defaultdict
@@ -14,18 +14,18 @@ from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
-from sim_node.physics.balls.projectiles import Projectiles
-from sim_node.physics.body import Body
-from sim_node.physics.engine_defaults import UNLIMITED_SPEED
+from sim_node.physics.bullet.balls import BulletBalls
+from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.touches import Touch, TouchedLinks
+from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.settings import WorldSettings
-from sim_node.physics.touches import Touch, TouchedLinks
 
 _STATE_FILE = "state.bullet"  # the engine saves its state to files only
 _RAYS = 10_000  # rays in one call; the engine takes up to 16,383
 _MAX_DEPTH = 1000.0  # m: how far below a point a surface is looked for
 
 
-class World:
+class BulletWorld:
     """The ground and the characters on it, and what is thrown at them, in a private engine.
 
     `to_bytes` and `from_bytes` keep the engine's contact caches, so that what follows a restored
@@ -71,10 +71,10 @@ class World:
             self._set_friction(ground, settings.friction)
         if settings.terrain is not None:
             self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
-        self.balls = Projectiles(self._client, settings.link_friction)
+        self.balls = BulletBalls(self._client, settings.link_friction)
         self._touched: TouchedLinks | None = None  # None: not asked for since the last step
 
-    def __enter__(self) -> "World":
+    def __enter__(self) -> "BulletWorld":
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -84,12 +84,19 @@ class World:
         """End the engine; the world cannot be used any more, nor what was added to it."""
         self._client.close()
 
-    def add(self, character: Character, speed_bound: float = UNLIMITED_SPEED) -> Body:
+    def add(self, character: Character, speed_bound: float = UNLIMITED_SPEED) -> BulletBody:
         """Put a character into the world, at the pose of its URDF.
 
         No degree of freedom is let be faster than `speed_bound`, rad/s or m/s.
         """
-        return Body(self._client, character, self._link_friction, speed_bound)
+        return BulletBody(
+            self._client,
+            character,
+            friction=self._link_friction,
+            speed_bound=speed_bound,
+            touched=self.touched_links,
+            balls=self.balls,
+        )
 
     def set_gravity(self, gravity: float) -> None:
         """Set gravity in m/s^2 along -z."""
@@ -98,9 +105,9 @@ class World:
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied again."""
         self._touched = None
-        with World._stepping:
-            if World._breaking_threshold != self._own_breaking_threshold:
-                World._breaking_threshold = self._own_breaking_threshold
+        with BulletWorld._stepping:
+            if BulletWorld._breaking_threshold != self._own_breaking_threshold:
+                BulletWorld._breaking_threshold = self._own_breaking_threshold
                 pybullet.setPhysicsEngineParameter(
                     contactBreakingThreshold=self._own_breaking_threshold,
                     physicsClientId=self._client,

@@ -11,7 +11,7 @@ from msgs_config.messages.throw import ProjectileThrow
 _AWAY_DISTANCE = 10_000.0  # m along x: where a ball lies that was taken out of the way
 
 
-class Projectiles:
+class BulletBalls:
     """The balls of a world, in the order in which they were thrown."""
 
     def __init__(self, client: Engine, friction: float) -> None:

@@ -13,11 +13,10 @@ from collections.abc import Mapping, Sequence
 
 from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.model import Character
+from sim_node.physics.joint_resistance import COUPLING_CORRECTION
 
 _NO_LIMIT = 1e9  # N m or N: the force of a coupling is not limited
 _ENGINE_CORRECTION = 0.2  # share of a limit's or contact's excess that an engine step corrects
-CORRECTION = 0.1
-"""The share of a coupling's error in position that a step takes away."""
 
 
 def set_friction(
@@ -58,7 +57,7 @@ def couple_joints(
                 gear,
                 gearRatio=-joint.mimic.multiplier,
                 relativePositionTarget=joint.mimic.offset,
-                erp=CORRECTION / _ENGINE_CORRECTION,
+                erp=COUPLING_CORRECTION / _ENGINE_CORRECTION,
                 maxForce=_NO_LIMIT,
                 physicsClientId=client,
             )

@@ -6,7 +6,7 @@ joint's rotation `q` in the engine is `o q o^-1` here, its velocity `w` is `o w`
 orientation `q` in the engine is `q o^-1` here.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -16,10 +16,11 @@ from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, rotations, scalars
-from sim_node.physics.engine_defaults import remove_motors, set_link_dynamics
-from sim_node.physics.joint_constraints import couple_joints, set_friction
-from sim_node.physics.loaded_links import check_links
-from sim_node.physics.touches import TouchedLinks, net_wrenches
+from sim_node.physics.bullet.balls import BulletBalls
+from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics
+from sim_node.physics.bullet.joint_constraints import couple_joints, set_friction
+from sim_node.physics.bullet.loaded_links import check_links
+from sim_node.physics.bullet.touches import TouchedLinks, net_wrenches
 
 _QUATERNION = 4  # numbers of a ball joint's position in the engine
 _SEARCH_DISTANCE = 1e3  # m, beyond which the engine need not look for what is near
@@ -29,7 +30,7 @@ BaseFrame: TypeAlias = tuple[scalars.Vector, scalars.Quaternion, scalars.Axes]
 """Origin in m, orientation xyzw and axes of a base link in the world."""
 
 
-class Body:
+class BulletBody:
     """A character loaded into an engine.
 
     Positions, velocities and efforts are (n,) arrays in message form; arrays of links have one row
@@ -37,17 +38,24 @@ class Body:
     """
 
     def __init__(
-        self, client: Engine, character: Character, friction: float, speed_bound: float
+        self,
+        client: Engine,
+        character: Character,
+        *,
+        friction: float,
+        speed_bound: float,
+        touched: Callable[[], TouchedLinks],
+        balls: BulletBalls,
     ) -> None:
         """Load the character.
 
         `friction` is that of every link, `speed_bound` in rad/s and m/s that of every degree of
-        freedom.
+        freedom; `touched` says what touched in the world's last step, whose balls are `balls`.
 
         Raises:
             CharacterError: the engine refuses the URDF or a mesh, or reads a link otherwise.
         """
-        self._client = client
+        self._client, self._touched, self._ball_bodies = client, touched, balls
         self._layout = character.layout
         self._body = load_urdf(client, character.loading)
         self._floating = self._layout.has_floating_base
@@ -64,8 +72,8 @@ class Body:
         self._find_joints(character)
         set_link_dynamics(client, self._body, friction, speed_bound)
         pairs = zip(self._joints, self._axes, strict=True)
-        balls = [number for number, axes in pairs if axes is not None]
-        remove_motors(client, self._body, self._joints, balls)
+        ball_joints = [number for number, axes in pairs if axes is not None]
+        remove_motors(client, self._body, self._joints, ball_joints)
         names = [j.name for j in self._layout.joints if j.type is not JointType.FLOATING]
         numbers = dict(zip(names, self._joints, strict=True))
         rubbing = [joint.name for joint in character.moving_joints if joint.friction]
@@ -262,17 +270,17 @@ class Body:
             pybullet.applyExternalForce(self._body, number, wrench[:3], at, **world)
             pybullet.applyExternalTorque(self._body, number, wrench[3:], **world)
 
-    def contact_wrenches(
-        self, touched: TouchedLinks, centres: Sequence[Sequence[float]]
-    ) -> tuple[FloatArray, BoolArray]:
-        """Net contact wrench (links, 6) of what touches; and which links do: see `net_wrenches`."""
-        return net_wrenches(touched.get(self._body, ()), self._row, centres)
+    def contact_wrenches(self) -> tuple[FloatArray, BoolArray]:
+        """Net contact wrenches (links, 6) of the last step; which links touched: `net_wrenches`."""
+        touches = self._touched().get(self._body, ())
+        return net_wrenches(touches, self._row, self.centres_at_step())
 
-    def gaps(self, other: int) -> FloatArray:
-        """Distance (links,) of each link's surface to another body's, m; inf where there is none.
+    def gaps(self, ball: int) -> FloatArray:
+        """Distance (links,) of each link's surface to a ball's, m; inf where there is none.
 
-        `other` is the engine's number of that body.
+        `ball` is its place in the order of throws.
         """
+        other = self._ball_bodies.numbers[ball]
         gaps = np.full(len(self._numbers), np.inf)
         for point in pybullet.getClosestPoints(
             self._body, other, distance=_SEARCH_DISTANCE, physicsClientId=self._client

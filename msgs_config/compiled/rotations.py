@@ -1,7 +1,7 @@
 """Rotations in compiled code: those of `msgs_config.geometry.scalars`, in the same doubles."""
 
-from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled.decorator import compiled
 from msgs_config.geometry import scalars
 from msgs_config.geometry.scalars import Quaternion, Vector
 

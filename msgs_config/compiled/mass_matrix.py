@@ -6,9 +6,9 @@ Source: Featherstone 2008, "Rigid Body Dynamics Algorithms", sections 6.4 and 6.
 
 from typing import NamedTuple
 
-from controller_node.planner.compiled.decorator import compiled
-from controller_node.planner.compiled.mujoco_functions import factorise_mass, solve_mass
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled.decorator import compiled
+from msgs_config.compiled.mujoco_functions import factorise_mass, solve_mass
 
 
 class Tree(NamedTuple):

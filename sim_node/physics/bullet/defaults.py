@@ -5,9 +5,6 @@ from collections.abc import Sequence
 from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.geometry import rotations
 
-UNLIMITED_SPEED = 1e9
-"""A bound that nothing sound reaches, rad/s or m/s; at Bullet's 100 no divergence would be seen."""
-
 
 def set_link_dynamics(client: Engine, body: int, friction: float, speed_bound: float) -> None:
     """Switch off the damping of a body's links and joints, and set every link's friction.

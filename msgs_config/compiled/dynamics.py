@@ -1,0 +1,196 @@
+"""A character's state taken over by MuJoCo, and stable PD in it, each in one compiled call.
+
+They call the functions of MuJoCo's that `msgs_config.character.dynamics` calls, in the same order,
+and make the sums of `controller_node.control_laws.stable_pd_effort` entry by entry: the result has
+the bits of these, which the tests compare.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.experimental import structref
+
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled import mujoco_functions as mj
+from msgs_config.compiled.decorator import compiled
+
+_OWN = types.Array(types.float64, 1, "C")
+GIVEN = types.Array(types.float64, 1, "A", readonly=True)
+"""Any array (n,): it is copied before MuJoCo reads it, as rows that lie apart cannot be."""
+_FIELDS = (
+    ("model", types.intp),
+    ("data", types.intp),
+    ("position", _OWN),
+    ("velocity", _OWN),
+    ("mass", _OWN),
+    ("diagonal", types.Array(types.intp, 1, "C")),
+    ("identity", _OWN),
+    ("desired", _OWN),
+    ("passive_damping", _OWN),
+    ("is_damped", types.boolean),
+)
+
+
+@structref.register
+class _ViewType(types.StructRef):
+    pass
+
+
+class DynamicsView(structref.StructRefProxy):
+    """What compiled code has of a `DynamicsModel`; one argument, for many would take a us or two.
+
+    MuJoCo's model and data by their addresses, the data's position (q,), velocity (n,) and entries
+    (e,) of the mass matrix, where these have the diagonal (n,), the position (q,) that is none at
+    all, room for a desired one (q,), and the joints' passive damping (n,).
+    """
+
+
+structref.define_proxy(DynamicsView, _ViewType, [name for name, _ in _FIELDS])
+VIEW = _ViewType(_FIELDS)
+"""Its type for compiled code."""
+
+
+@compiled.of(VIEW(*(kind for _, kind in _FIELDS)))
+def make_view(
+    model: int,
+    data: int,
+    position: FloatArray,
+    velocity: FloatArray,
+    mass: FloatArray,
+    diagonal: IntArray,
+    identity: FloatArray,
+    desired: FloatArray,
+    passive_damping: FloatArray,
+    is_damped: bool,
+) -> Any:
+    """The view, made by compiled code that is kept; numba's own way compiles in each process."""
+    return DynamicsView(
+        model,
+        data,
+        position,
+        velocity,
+        mass,
+        diagonal,
+        identity,
+        desired,
+        passive_damping,
+        is_damped,
+    )
+
+
+@compiled
+def _convert(view: Any, position: FloatArray, out: FloatArray) -> None:
+    """Write a position (n,), message form, as MuJoCo has it (q,)."""
+    moved = position.copy()
+    out[:] = view.identity
+    mj.move_position(view.model, out.ctypes.data, moved.ctypes.data, 1.0)
+
+
+@compiled.of(types.void(VIEW, GIVEN, GIVEN))
+def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
+    """Take over a state: position (n,), message form, and velocity (n,)."""
+    _convert(view, position, view.position)
+    view.velocity[:] = velocity
+    mj.find_frames(view.model, view.data)
+    mj.find_centres_of_mass(view.model, view.data)
+    mj.find_mass_matrix(view.model, view.data)
+    mj.find_velocities(view.model, view.data)
+
+
+@compiled
+def _known_effort(
+    view: Any,
+    velocity: FloatArray,
+    desired: FloatArray,
+    desired_velocity: FloatArray,
+    stiffness: FloatArray,
+    damping: FloatArray,
+    offset: FloatArray,
+    feedforward: FloatArray,
+    period: float,
+) -> FloatArray:
+    """The effort (n,) without what follows of the acceleration."""
+    error = np.empty(len(velocity))
+    _convert(view, desired, view.desired)
+    start, end = view.position.ctypes.data, view.desired.ctypes.data
+    mj.find_difference(view.model, error.ctypes.data, 1.0, start, end)
+    if len(offset):
+        error += offset
+    known = np.empty(len(velocity))
+    for i in range(len(velocity)):
+        known[i] = (
+            (feedforward[i] if len(feedforward) else 0.0)
+            + stiffness[i] * (error[i] - period * velocity[i])
+            + damping[i] * (desired_velocity[i] - velocity[i])
+        )
+    return known
+
+
+@compiled
+def _without_bias(view: Any, known: FloatArray, velocity: FloatArray) -> FloatArray:
+    """A force (n,) less Coriolis', centrifugal, gravity's, and passive damping's."""
+    bias = np.zeros(len(known))
+    mj.find_bias_force(view.model, view.data, 0, bias.ctypes.data)
+    if view.is_damped:
+        for i in range(len(bias)):
+            bias[i] += view.passive_damping[i] * velocity[i]
+    return known - bias
+
+
+@compiled
+def _minus_implicit(
+    view: Any, known: FloatArray, force: FloatArray, damping: FloatArray, period: float
+) -> FloatArray:
+    """The effort (n,): what is known, less what the acceleration by a force (n,) takes."""
+    implicit, without = damping * period, np.empty(len(known))
+    for i in range(len(known)):
+        added = implicit[i]
+        if view.is_damped:
+            added = period * view.passive_damping[i] + added
+        without[i] = view.mass[view.diagonal[i]]
+        view.mass[view.diagonal[i]] = without[i] + added
+    mj.factorise_mass(view.model, view.data)
+    for i in range(len(known)):
+        view.mass[view.diagonal[i]] = without[i]
+    acceleration = np.empty(len(known))
+    mj.solve_mass(view.model, view.data, acceleration.ctypes.data, force.ctypes.data, 1)
+    effort = np.empty(len(known))
+    for i in range(len(known)):
+        effort[i] = known[i] - implicit[i] * acceleration[i]
+    return effort
+
+
+@compiled.of(_OWN(VIEW, *(8 * [GIVEN]), types.float64))
+def stable_pd(
+    view: Any,
+    position: FloatArray,
+    velocity: FloatArray,
+    desired: FloatArray,
+    desired_velocity: FloatArray,
+    stiffness: FloatArray,
+    damping: FloatArray,
+    offset: FloatArray,
+    feedforward: FloatArray,
+    period: float,
+) -> FloatArray:
+    """The effort (n,) of stable PD in a state, which is taken over; see `stable_pd_effort`.
+
+    Args:
+        view: The model.
+        position: Of the state (n,), message form.
+        velocity: Of the state (n,).
+        desired: The reference's position (n,) at the period's end, message form.
+        desired_velocity: The reference's velocity (n,) at the period's end.
+        stiffness: (n,) N m/rad or N/m.
+        damping: (n,) N m s/rad or N s/m.
+        offset: Added to the errors (n,); or (0,).
+        feedforward: Acts beside the law (n,); or (0,).
+        period: s.
+    """
+    take_state(view, position, velocity)
+    known = _known_effort(
+        view, velocity, desired, desired_velocity, stiffness, damping, offset, feedforward, period
+    )
+    force = _without_bias(view, known, velocity)
+    return _minus_implicit(view, known, force, damping, period)

@@ -1,0 +1,1 @@
+"""The engine Bullet, by PyBullet: the one place of the simulator that knows it."""
