@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from msgs_config import files
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.messages import configuration
 from sim_node.parameters import load_parameters
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings

@@ -15,13 +15,13 @@ from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.surfaces import arrow_surface, round_surface
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
-from msgs_config.character.c_library import c_numbers, captured_output
 from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.geometry.surface import Surface
+from sim_node.physics.bullet.c_library import c_numbers, captured_output
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 

@@ -12,11 +12,11 @@ from typing import TypeAlias
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.bullet.balls import BulletBalls
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics
 from sim_node.physics.bullet.joint_constraints import couple_joints, set_friction
 from sim_node.physics.bullet.loaded_links import check_links

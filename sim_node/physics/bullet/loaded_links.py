@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.model import Character, Pose
 from msgs_config.errors import CharacterError
+from sim_node.physics.bullet.client import Engine, pybullet
 
 _MAX_DIFFERENCE = 1e-9  # share of the largest entry
 

@@ -10,10 +10,10 @@ import pytest
 from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.renderer import Picture, Renderer
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
+from sim_node.physics.bullet.client import pybullet
 from tests.support.physics import EVERY_CHARACTER, character, character_id, random_state
 from tests.support.pictures import followed, take_picture, view_of
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     EVERY_CHARACTER,

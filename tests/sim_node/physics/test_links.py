@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (

@@ -15,7 +15,6 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import read_character_file
 from msgs_config.character.layout import SCALAR, JointType
 from msgs_config.character.links.reading import read_links
@@ -25,6 +24,7 @@ from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from tests.support.urdf import joint, robot
 
 PROJECT = Path(__file__).parents[4]

@@ -229,7 +229,7 @@ def test_a_link_that_the_engine_reads_otherwise_is_refused(
 ) -> None:
     """As it would be without the repair of the text that the engine is given."""
     character = loaded(tmp_path, link("a", body(1.0, "1 2 4")))
-    monkeypatch.setattr("msgs_config.character.urdf.engine_text.repair_urdf", lambda *_: [])
+    monkeypatch.setattr("sim_node.physics.bullet.urdf_text.repair_urdf", lambda *_: [])
 
     with pytest.raises(CharacterError) as caught:
         measure_probe(character, 9.81)
