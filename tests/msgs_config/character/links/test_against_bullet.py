@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pybullet_data
 import pytest
 
+from msgs_config.arrays import FloatArray
 from msgs_config.character.file import read_character_file
 from msgs_config.character.layout import SCALAR, JointType
 from msgs_config.character.links.reading import read_links
@@ -24,8 +24,11 @@ from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
-from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from tests.support.urdf import joint, robot
+
+bullet = pytest.importorskip("sim_node.physics.bullet.client")
+pybullet = bullet.pybullet
+pybullet_data = pytest.importorskip("pybullet_data")
 
 PROJECT = Path(__file__).parents[4]
 DATA = Path(pybullet_data.getDataPath())
@@ -65,9 +68,9 @@ def ours(link: Link) -> Numbers:
 
 def bullets(loading: UrdfOptions) -> list[Numbers]:
     """The same from Bullet, with its joints' frames turned from the inertial ones to the links'."""
-    client = Engine()
+    client = bullet.Engine()
     try:
-        body = load_urdf(client, loading)
+        body = bullet.load_urdf(client, loading)
         names = [pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()]
         links = [Numbers(names[0], -1, *dynamics_of(client, body, -1), ())]
         for number in range(pybullet.getNumJoints(body, physicsClientId=client)):
@@ -80,12 +83,12 @@ def bullets(loading: UrdfOptions) -> list[Numbers]:
     return links
 
 
-def dynamics_of(client: Engine, body: int, number: int) -> tuple[Any, ...]:
+def dynamics_of(client: Any, body: int, number: int) -> tuple[Any, ...]:
     mass, _, *rest = pybullet.getDynamicsInfo(body, number, physicsClientId=client)[:5]
     return (mass, *rest)
 
 
-def joint_of(info: tuple[Any, ...], parent: Numbers, child_turn: np.ndarray) -> tuple[Any, ...]:
+def joint_of(info: tuple[Any, ...], parent: Numbers, child_turn: FloatArray) -> tuple[Any, ...]:
     """Position, turn and axis are given in the parent's and the child's inertial frame."""
     parent_turn = np.array(parent.principal_axes_xyzw)
     offset, turn, axis = (np.array(info[index], dtype=float) for index in (14, 15, 13))
