@@ -63,8 +63,7 @@ def read_links(robot: ElementTree.Element, loading: UrdfOptions) -> list[Link]:
     below = defaultdict[str, list[ElementTree.Element]](list)
     for element in robot.findall("joint"):
         below[joint_end(element, "parent")].append(element)
-    ends = {joint_end(element, "child") for elements in below.values() for element in elements}
-    (base,) = set(elements) - ends
+    (base,) = set(elements) - {joint_end(each, "child") for each in robot.findall("joint")}
     root = Joint(ROOT, JointType.FIXED if loading.fixed_base else JointType.FLOATING)
     frame = _inertial_frame(elements[base], loading)
     links = [_read_link(elements[base], -1, root, frame, loading)]
@@ -141,6 +140,7 @@ def _read_joint(
     )
     offset = scalars.to_parent(scalars.axes(parent_turn), in_parent.origin)
     limit, dynamics = element.find("limit"), element.find("dynamics")
+    effort = _number(limit, "effort")
     lower, upper = -math.inf, math.inf
     if element.get("type") in WITH_BOUNDS and limit is not None:
         unit = lengths if joint_type is JointType.PRISMATIC else 1.0
@@ -152,7 +152,7 @@ def _read_joint(
         pose_in_parent=Pose(scalars.add(parent.origin, offset), orientation),
         lower=lower,
         upper=upper,
-        effort_limit=_number(limit, "effort") or math.inf,
+        effort_limit=effort if effort > 0.0 else math.inf,
         damping=_number(dynamics, "damping") if is_scalar else 0.0,
         friction=_number(dynamics, "friction") if is_scalar else 0.0,
     )
