@@ -58,6 +58,7 @@ setup(
         "mujoco-core==4.0.1",  # exactly: another engine may have other last bits
         "numba>=0.61,<0.70",
         "numpy>=1.26,<3",
+        "pillow>=9.1",  # textures of meshes; matplotlib needs it as well
         "pybullet==3.2.7",  # exactly, likewise
         "pycollada>=0.9,<0.10",  # meshes of every eighth robot (1.7 MB, BSD-3, pure Python)
         "PyYAML>=6.0,<7",

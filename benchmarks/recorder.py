@@ -50,10 +50,10 @@ def time_run(plan: RunPlan, *, recorded: bool, composed: bool) -> RunTiming:
         nodes.start_loop(simulator, controller, composed=composed)
         nodes.wait_until(lambda: nodes.tick > 1)
         first, began = nodes.tick, time.monotonic()
-        busy = processor_time(recorder) if recorder else 0.0
+        busy = processor_time(recorder.pid) if recorder else 0.0
         nodes.wait_until(lambda: nodes.tick > plan.ticks)
         taken = time.monotonic() - began
-        used = processor_time(recorder) - busy if recorder else 0.0
+        used = processor_time(recorder.pid) - busy if recorder else 0.0
         return RunTiming((nodes.tick - first) / taken, used / taken)
 
 

@@ -120,7 +120,7 @@ def _time(nodes: Nodes, viewer: Child, page: PageClient | None) -> WatchTiming:
         known = len(nodes.reports)
         nodes.wait_until(lambda: len(nodes.reports) > known)
         pictures = page.pictures if page is not None else 0
-        return time.monotonic(), nodes.tick, processor_time(viewer), pictures
+        return time.monotonic(), nodes.tick, processor_time(viewer.pid), pictures
 
     first = count()
     for _ in range(_REPORTS):

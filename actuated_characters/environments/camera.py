@@ -13,7 +13,7 @@ from sim_node.physics.settings import WorldSettings
 
 
 class FollowingCamera:
-    """A camera that goes along the ground with a character's root, in an engine of its own."""
+    """A camera that goes along the ground with a character's root."""
 
     def __init__(
         self,
@@ -22,7 +22,7 @@ class FollowingCamera:
         size: Size,
         positions: Sequence[FloatArray],
     ) -> None:
-        """Start the engine; the view is so wide that all of some positions (n,) fit into it.
+        """Make a view so wide that all of some positions (n,) fit into it.
 
         Raises:
             CharacterError: a file of the character or of the terrain cannot be drawn.
@@ -40,7 +40,3 @@ class FollowingCamera:
         way = self._posed.ways(np.concatenate((self._first, [position])))[1].tolist()
         frame = FrameSpec(position, view=self._view.moved(*way), ghost=desired)
         return self._renderer.picture(frame, self._size)
-
-    def close(self) -> None:
-        """End the engine."""
-        self._renderer.close()

@@ -264,12 +264,10 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         return self._camera.picture(self._simulation.state.position, desired.configuration.position)
 
     def close(self) -> None:
-        """End the engines; once it is closed, nothing happens."""
+        """End the engine; once it is closed, nothing happens."""
         if not self._is_closed:
             self._is_closed = True
             self._simulation.close()
-            if self._camera is not None:
-                self._camera.close()
 
     def __reduce__(self) -> NoReturn:
         raise SimulationError(

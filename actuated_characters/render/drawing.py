@@ -26,7 +26,7 @@ class SceneSettings:
     write: Callable[[Picture, str], Picture]  # adds a caption
 
     def renderer(self) -> Renderer:
-        """Start an engine for it."""
+        """Make what draws it."""
         return Renderer(self.characters, ground=self.ground, terrain=self.terrain)
 
 
@@ -47,9 +47,9 @@ def draw(
         RunError: a process ended.
     """
     if workers <= 1:
-        with settings.renderer() as renderer:
-            for frame in frames:
-                yield _picture(settings, renderer, frame)
+        renderer = settings.renderer()
+        for frame in frames:
+            yield _picture(settings, renderer, frame)
         return
     # a layout remembers what it has looked up, and cannot be sent; it is rebuilt when needed
     sent = replace(settings, characters=tuple(replace(each) for each in settings.characters))

@@ -23,6 +23,7 @@ class Nodes:
     def __init__(self) -> None:
         self.reports: list[dict[str, str]] = []  # those of the simulator, oldest first
         self._simulator: Child | None = None
+        self._loop: list[Child] = []
 
     def __enter__(self) -> "Nodes":
         self._stack = ExitStack()
@@ -60,11 +61,16 @@ class Nodes:
         if composed:
             parameters = {topics.SIM_NODE: simulator, topics.CONTROLLER_NODE: controller}
             self._simulator = self._children.start_composed("composed", parameters)
+            self._loop = [self._simulator]
             return
-        self.start(topics.SIM_NODE, simulator)
+        simulating = self.start(topics.SIM_NODE, simulator)
         if not simulator.get("wait_for_subscribers"):
             self.wait_until(lambda: self.reports)
-        self.start(topics.CONTROLLER_NODE, controller)
+        self._loop = [simulating, self.start(topics.CONTROLLER_NODE, controller)]
+
+    def loop_processor_time(self) -> float:
+        """How long simulator and controller have kept processors busy so far, s."""
+        return sum(processor_time(child.pid) for child in self._loop)
 
     @property
     def tick(self) -> int:
@@ -106,8 +112,8 @@ def private_memory(child: Child) -> float:
     return 1e-3 * float(anonymous)
 
 
-def processor_time(child: Child) -> float:
-    """How long a child has kept a processor busy so far, s."""
-    fields = Path(f"/proc/{child.pid}/stat").read_text().rpartition(")")[2].split()
+def processor_time(pid: int) -> float:
+    """How long a process has kept processors busy so far, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     user, system = (int(field) for field in fields[11:13])  # utime and stime of proc(5)
     return (user + system) / os.sysconf("SC_CLK_TCK")

@@ -17,6 +17,8 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from benchmarks.support.nodes import processor_time
+from benchmarks.support.timing import TickTimes
 from msgs_config.arrays import FloatArray
 from msgs_config.bus.dds import create_publisher
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
@@ -35,8 +37,8 @@ _SIZE, _WAY = "BENCHMARK_ANSWER_BYTES", "BENCHMARK_WAY"
 _DIRECT, _EXECUTOR = "direct", "executor"
 
 
-def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
-    """Durations (count,) in s of round trips of a state there and a torque back."""
+def round_trips(layout: JointLayout, count: int, *, direct: bool) -> TickTimes:
+    """What a round trip takes of a state there and a torque back; so many are measured."""
     encoder, zeros = JointStateEncoder(layout.dof_names), np.zeros(layout.size)
     answer_bytes = len(encoder.encode(0, effort=zeros))
     way = _DIRECT if direct else _EXECUTOR
@@ -55,13 +57,21 @@ def round_trips(layout: JointLayout, count: int, *, direct: bool) -> FloatArray:
         publisher = create_publisher(node, _PING)
         _wait(lambda: publisher.get_subscription_count() and node.count_publishers("pong"))
         message = encoder.encode(0, zeros, zeros, zeros)
-        durations = np.empty(_WARM_UP + count)
-        for index in range(len(durations)):
-            started = time.perf_counter()
-            publisher.publish(message)
-            _wait(take)
-            durations[index] = time.perf_counter() - started
-        return durations[_WARM_UP:]
+
+        def time_trips(count: int) -> FloatArray:
+            durations = np.empty(count)
+            for index in range(count):
+                started = time.perf_counter()
+                publisher.publish(message)
+                _wait(take)
+                durations[index] = time.perf_counter() - started
+            return durations
+
+        time_trips(_WARM_UP)
+        worked_before = time.process_time() + processor_time(far.pid)
+        durations = time_trips(count)
+        worked = time.process_time() + processor_time(far.pid) - worked_before
+        return TickTimes.of(durations, worked)
 
 
 def _taker(node: Node, topic: Topic, way: str, at_end: ExitStack) -> Callable[[], bool]:

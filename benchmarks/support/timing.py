@@ -1,15 +1,35 @@
-"""How long the calls of a method take, and a piece of work to measure others by."""
+"""What a tick takes, how long the calls of a method, and a piece of work to measure others by."""
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
+from msgs_config.arrays import FloatArray
+
 _ROUNDS = 7  # the best one counts, which others on the machine disturbed the least
 _CALLS = 2000
+
+
+@dataclass(frozen=True)
+class TickTimes:
+    """What one tick, or one round trip, takes."""
+
+    p50_us: float  # median of the wall time
+    p99_us: float  # its 99th percentile
+    per_second: float
+    processor_us: float  # mean of all processes' processor time; NaN: not measured
+
+    @classmethod
+    def of(cls, durations: FloatArray, processor_s: float = float("nan")) -> "TickTimes":
+        """Of durations (ticks,) in s, and the processor time in s of all together."""
+        p50, p99 = np.percentile(1e6 * durations, (50, 99))
+        processor_us = 1e6 * processor_s / len(durations)
+        return cls(float(p50), float(p99), float(1.0 / durations.mean()), processor_us)
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """Waiting for messages with the least delay, while services and parameters stay alive.
 
 An executor's way from a message to its callback costs more than the rest of a lockstep tick. So a
-loop takes the one message that it waits for directly from the subscription, gives the processor
-away between tries, and lets the executor have a turn every now and then. When nothing comes for a
-while the loop blocks in the executor, and an idle node costs nothing.
+loop takes the one message that it waits for directly from the subscription, and lets the executor
+have a turn every now and then. Between tries it gives the processor away; after some it blocks
+until the middleware has a message. When nothing comes for a while the loop blocks in the executor,
+and an idle node costs nothing.
 """
 
+import math
 import os
 import time
 from collections import deque
@@ -24,7 +26,11 @@ _SHORT_REST = 0.002  # s; waking up from the executor takes up to that
 _SLEEP_ERROR = 0.0002  # s by which a sleep may be late
 _MOST_TURNS = 50  # turns of the executor in a row, with one callback each
 _MOST_DISCARDED = 20_000  # messages, more than can wait
-_BUSY_PERIOD = 0.003  # s of taking turns with other processes before the loop blocks
+_BUSY_PERIOD = 0.1  # s without a message before the loop blocks in the executor
+_LONGEST_SPIN = 0.0005  # s of tries before a wait blocks: longer than most ticks take
+_LEAST_SHARE = 0.5  # of the processor, below which others need it more than the tries do
+_MOST_WITHOUT = 63  # waits in a row without tries, after which they may pay again
+_NS_PER_S = 10**9
 _MATCHED = rclpy_implementation.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MATCHED
 
 
@@ -104,6 +110,52 @@ def _received(raw: bytes, info: dict[str, int]) -> Received:
     return Received(raw, info["source_timestamp"], info.get("publication_sequence_number"))
 
 
+class Spin:
+    """The tries at the beginning of each wait, before the loop blocks.
+
+    They pay where the sender works on another core: a loop that blocks must be woken up first. On
+    a busy machine they take the core from those that the loop waits for. So after tries that did
+    not pay some waits go without any, twice as many each time.
+    """
+
+    def __init__(self) -> None:
+        self._until: float | None = None  # s; None: no wait has begun, -inf: it is without tries
+        self._began = (0.0, 0.0)  # s of wall time, and of this thread's processor time
+        self._waits_without = self._waits_left = 0  # after the last tries in vain; still to come
+
+    def goes_on(self, now: float) -> bool:
+        """Whether a wait that has not been met should try again at once, rather than block."""
+        if self._until is None:
+            self._until = self._begin(now)
+        if now < self._until:
+            return True
+        if self._until > -math.inf:
+            self._note(paid=False)
+        return False
+
+    def end(self, now: float) -> None:
+        """Note that what was waited for has come, during the tries or after them."""
+        if self._until is not None and self._until > -math.inf:
+            began, worked_before = self._began
+            worked = time.thread_time() - worked_before
+            # A message that came while others had the core would have come to a sleeper, too.
+            self._note(paid=worked > _LEAST_SHARE * (now - began))
+        self._until = None
+
+    def _begin(self, now: float) -> float:
+        """Until when a new wait tries."""
+        if self._waits_left:
+            self._waits_left -= 1
+            return -math.inf
+        self._began = (now, time.thread_time())
+        return now + _LONGEST_SPIN
+
+    def _note(self, *, paid: bool) -> None:
+        self._waits_without = 0 if paid else min(2 * self._waits_without + 1, _MOST_WITHOUT)
+        self._waits_left = self._waits_without
+        self._until = -math.inf
+
+
 class PollingExecutor:
     """Gives a loop's idle moments to other processes and to the executor of the loop's nodes."""
 
@@ -112,23 +164,50 @@ class PollingExecutor:
         self._executor = SingleThreadedExecutor(context=nodes[0].context)
         for node in nodes:
             self._executor.add_node(node)
+        self._nodes = nodes
         self._types = [EndpointTypes(node) for node in nodes]
         self._service_period = service_period
+        self._spin = Spin()
+        self._was_woken = False  # by a message that the loop has not taken yet
         self._busy_until = 0.0
         self._next_service = 0.0
 
     def received(self) -> None:
-        """Note that a message came: the next one is worth waiting for without blocking."""
-        self._busy_until = time.monotonic() + _BUSY_PERIOD
+        """Note that a message came: the next one is worth waiting for without the executor."""
+        now = time.monotonic()
+        self._busy_until = now + _BUSY_PERIOD
+        self._was_woken = False
+        self._spin.end(now)
 
     def rest(self) -> None:
         """Let others work; at most about 20 ms."""
-        if time.monotonic() > self._busy_until:
+        now = time.monotonic()
+        if now > self._busy_until:
             self._look_at_types()
             self._turn(_SERVICE_PERIOD)
-        else:
-            self.serve()
+        elif self._was_woken:  # by what the loop does not take: it would wake it again and again
+            self._was_woken = False
+            self.serve_pending()
+        elif now > self._next_service:
+            self.serve()  # which may take what the loop waits for
+        elif self._spin.goes_on(now):
             os.sched_yield()
+        else:
+            self._was_woken = self._wait_for_message(self._next_service - now)
+
+    def _wait_for_message(self, seconds: float) -> bool:
+        """Block until any subscription has a message; whether one has."""
+        # A turn of the executor would wait for services, too, and cost several times as much.
+        subscriptions = [each.handle for node in self._nodes for each in node.subscriptions]
+        if not subscriptions:
+            return self._turn(seconds)
+        context = self._executor.context.handle
+        waiting = rclpy_implementation.WaitSet(len(subscriptions), 0, 0, 0, 0, 0, context)
+        waiting.clear_entities()
+        for each in subscriptions:
+            waiting.add_subscription(each)
+        waiting.wait(round(seconds * _NS_PER_S))
+        return bool(waiting.get_ready_entities("subscription"))
 
     def rest_for(self, seconds: float) -> None:
         """Let others work for a time that is known; ends early rather than late."""

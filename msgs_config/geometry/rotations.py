@@ -235,6 +235,14 @@ def about_z(angle: float) -> FloatArray:
     return np.array([0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)])
 
 
+def from_z(direction: FloatArray) -> FloatArray:
+    """The shortest turn xyzw (4,) that leads z to a direction (3,) of any length but zero."""
+    x, y, z = (direction / fixed_order.norm(direction)).tolist()
+    if z < -1.0 + 1e-9:
+        return np.array((1.0, 0.0, 0.0, 0.0))
+    return normalised(np.array((-y, x, 0.0, 1.0 + z)))
+
+
 ABOUT_X_QUARTER_TURN_XYZW = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 """Turns a y-up model or clip into the z-up world."""
 

@@ -11,7 +11,6 @@ import pybullet
 import pytest
 
 import actuated_characters as ac
-from actuated_characters.render.engine.renderer import Renderer
 from msgs_config.errors import CharacterError, ClosedError
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.bullet.client import Engine
@@ -170,14 +169,6 @@ def test_a_terrain_that_cannot_be_loaded_leaves_no_engine(
         ac.Simulation(pendulum, terrain=str(tmp_path / "ground.urdf"))
     assert engines() == before
     assert "ground.urdf" in str(caught.value)
-
-
-def test_a_renderer_that_is_closed_twice_ends_no_other(pendulum: ac.Character) -> None:
-    first = Renderer(pendulum)
-    first.close()
-    with Renderer(pendulum) as second:
-        first.close()
-        assert second is not first
 
 
 def test_an_engine_gives_its_number_until_it_is_closed() -> None:

@@ -19,6 +19,7 @@ from msgs_config.character.file import shipped_characters
 from msgs_config.errors import SimulationError
 from sim_node.simulation_factory import make_simulation_settings
 from tests.support.physics import character, random_state
+from tests.support.pictures import take_picture
 
 Copied = TypeVar("Copied")
 
@@ -176,10 +177,10 @@ def test_a_world_says_that_it_cannot_be_copied(duplicate: Callable[[object], obj
         simulation.step([0.0])
 
 
-@pytest.mark.parametrize("duplicate", [copy.deepcopy, pickle.dumps])
-def test_a_renderer_says_that_it_cannot_be_copied(duplicate: Callable[[object], object]) -> None:
-    with (
-        Renderer(character("pendulum")) as camera,
-        pytest.raises(SimulationError, match="neither copied nor pickled"),
-    ):
-        duplicate(camera)
+@COPY
+def test_a_copied_renderer_draws_the_same(duplicate: Callable[[Renderer], Renderer]) -> None:
+    camera = Renderer(character("pendulum"))
+    before, after = (
+        take_picture(each, np.array([0.3]), size=(60, 40)) for each in (camera, duplicate(camera))
+    )
+    assert np.array_equal(before, after)

@@ -162,7 +162,12 @@ def test_every_ros_package_that_is_imported_is_a_dependency() -> None:
 
 
 def test_every_python_package_that_is_imported_is_required() -> None:
-    distributions = {"PyYAML": "yaml", "mujoco-core": "mujoco", "pycollada": "collada"}
+    distributions = {
+        "PyYAML": "yaml",
+        "mujoco-core": "mujoco",
+        "pillow": "PIL",
+        "pycollada": "collada",
+    }
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])

@@ -126,8 +126,8 @@ def draw_position(
     name: str, position: FloatArray, view: CameraPose, size: Size
 ) -> tuple[Picture, BoolArray]:
     """The renderer's picture of a character at a position (n,), and where (h, w) it is seen."""
-    with Renderer(load_character(name), ground=False, samples=1) as renderer:
-        picture = renderer.picture(FrameSpec(position, view=view), size)
+    renderer = Renderer(load_character(name), ground=False, samples=1)
+    picture = renderer.picture(FrameSpec(position, view=view), size)
     return picture, (picture != picture[0, 0]).any(axis=2)
 
 

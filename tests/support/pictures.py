@@ -43,6 +43,14 @@ def is_green(seen: Picture, by: int) -> BoolArray:
     return greener
 
 
+def pixels_of(view: CameraPose, points: FloatArray, size: Size) -> IntArray:
+    """Row and column (2, m), maybe outside, at which points (3, m) are seen; m, world."""
+    width, height = size
+    across, upwards, back = view.axes() @ (points - view.eye()[:, np.newaxis])
+    metres = -view.pixel(height) * back
+    return np.floor((0.5 * height - upwards / metres, 0.5 * width + across / metres)).astype(int)
+
+
 def points_at(view: CameraPose, pixels: IntArray, depth: FloatArray, size: Size) -> FloatArray:
     """What is seen at rows and columns (2, m) so far away (m,) along the axis: (3, m), m, world."""
     width, height = size

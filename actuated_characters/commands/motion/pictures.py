@@ -27,19 +27,19 @@ def comparison_strip(target: TargetBody, made: RetargetedMotion, count: int = _C
     frames = np.unique(np.linspace(0, made.source.frames - 1, count).round().astype(int))
     layout = target.character.layout
     tiles = []
-    with Renderer(target.character) as renderer:
-        for frame in frames.tolist():
-            position = made.motion.position[frame].copy()
-            position[layout.rotation_entries] = rotations.log(made.motion.orientations_xyzw[frame])
-            nodes = made.source.positions[frame] + np.array((0.0, -_BESIDE, 0.0))
-            here = np.array((*position[:2], 0.0))
-            position[:2], nodes = 0.0, nodes - here
-            bodies = renderer.posed.spheres(renderer.posed.frames(position))
-            captured = Spheres(nodes, np.full(len(nodes), _JOINT))
-            view = framing(Spheres.joined((bodies, captured)), _SIZE[0] / _SIZE[1], _VIEW)
-            picture = renderer.picture(FrameSpec(position, view), _SIZE)
-            drawn = _with_skeleton(picture, view, made, nodes)
-            tiles.append(captioned(drawn, f"{frame * made.source.frame_time:.2f} s"))
+    renderer = Renderer(target.character)
+    for frame in frames.tolist():
+        position = made.motion.position[frame].copy()
+        position[layout.rotation_entries] = rotations.log(made.motion.orientations_xyzw[frame])
+        nodes = made.source.positions[frame] + np.array((0.0, -_BESIDE, 0.0))
+        here = np.array((*position[:2], 0.0))
+        position[:2], nodes = 0.0, nodes - here
+        bodies = renderer.posed.spheres(renderer.posed.frames(position))
+        captured = Spheres(nodes, np.full(len(nodes), _JOINT))
+        view = framing(Spheres.joined((bodies, captured)), _SIZE[0] / _SIZE[1], _VIEW)
+        picture = renderer.picture(FrameSpec(position, view), _SIZE)
+        drawn = _with_skeleton(picture, view, made, nodes)
+        tiles.append(captioned(drawn, f"{frame * made.source.frame_time:.2f} s"))
     return side_by_side(tiles, len(tiles))
 
 

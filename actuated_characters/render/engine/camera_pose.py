@@ -1,4 +1,4 @@
-"""A pinhole camera: where it stands, what it sees, and how to place it. No engine."""
+"""A pinhole camera: where it stands, what it sees, and how to place it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -7,8 +7,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Vector
+from msgs_config.geometry import fixed_order
 
 _MARGIN = 0.05  # share of the extent of what is seen that stays free around it
 
@@ -34,7 +35,7 @@ class Spheres(NamedTuple):
 
     def bounds(self, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The lowest and the highest coordinates (3,) along unit vectors (3, 3), by row."""
-        along, reach = self.centres @ axes.T, self.radii[:, np.newaxis]
+        along, reach = fixed_order.apply(axes, self.centres), self.radii[:, np.newaxis]
         return (along - reach).min(axis=0), (along + reach).max(axis=0)
 
 
@@ -88,14 +89,6 @@ class CameraPose:
         """Edge of a pixel per distance along the camera's axis, in a picture of a height."""
         return 2.0 * tan(0.5 * self.field_of_view) / height
 
-    def pixels(self, points: FloatArray, size: Size) -> IntArray:
-        """Row and column (2, m), maybe outside, at which points (3, m) are seen; m, world."""
-        width, height = size
-        across, upwards, back = self.axes() @ (points - self.eye()[:, np.newaxis])
-        scale = -1.0 / (self.pixel(height) * back)
-        rows, columns = 0.5 * height - scale * upwards, 0.5 * width + scale * across
-        return np.floor((rows, columns)).astype(np.intp)
-
     def box(self, seen: Spheres, size: Size) -> PixelRegion:
         """The part of a picture in which spheres are seen, with half a pixel around them.
 
@@ -104,7 +97,7 @@ class CameraPose:
         width, height = size
         if not len(seen.radii):
             return PixelRegion(0, 0, 0, 0)
-        in_axes = self.axes() @ (seen.centres - self.eye()).T
+        in_axes = fixed_order.apply(self.axes(), seen.centres - self.eye()).T
         nearest, farthest = -in_axes[2] - seen.radii, -in_axes[2] + seen.radii
         if nearest.min() <= 0.0:
             return PixelRegion(0, height, 0, width)
@@ -141,13 +134,13 @@ def framing(seen: Spheres, aspect: float, like: CameraPose) -> CameraPose:
     middle = 0.5 * (lowest + highest)
     half_height = 0.5 * like.field_of_view
     half_width = atan(aspect * tan(half_height))
-    from_middle = seen.centres @ axes.T - middle
+    from_middle = fixed_order.apply(axes, seen.centres) - middle
     across, along = np.abs(from_middle)[:, :2], from_middle[:, 2]
     needed = [
         along + (across[:, side] * cos(half) + seen.radii + margin) / sin(half)
         for side, half in enumerate((half_width, half_height))
     ]
-    x, y, z = (middle @ axes).tolist()
+    x, y, z = fixed_order.apply(axes.T, middle).tolist()
     return replace(like, target=(x, y, z), distance=float(np.max(needed)))
 
 

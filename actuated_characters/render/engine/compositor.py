@@ -18,8 +18,10 @@ from actuated_characters.render.engine.camera_pose import (
     framing,
 )
 from actuated_characters.render.engine.ground import Samples
+from actuated_characters.render.engine.rasteriser import add_shadow
 from actuated_characters.render.engine.render_scene import LIGHT_VIEW, RenderScene
 from msgs_config.arrays import BoolArray
+from msgs_config.geometry import fixed_order
 
 Picture: TypeAlias = NDArray[np.uint8]
 """Red, green and blue (h, w, 3), rows from top to bottom, columns from left to right."""
@@ -59,8 +61,10 @@ class Compositor:
     def darken_ground(self, scene: RenderScene, casting: Spheres) -> None:
         """Darken the ground where what lies in spheres keeps the light off.
 
-        That is what is seen from the light. The engine's own shadows darken the ground as a whole.
+        That is what is seen from the light.
         """
+        if not len(casting.radii):
+            return
         light = framing(casting, 1.0, LIGHT_VIEW)
         width, height = _SHADOW_SIZE
         dark = scene.draw(light, _SHADOW_SIZE, PixelRegion(0, height, 0, width)).casts_shadow
@@ -69,7 +73,7 @@ class Compositor:
         corners = np.column_stack((x.ravel(), y.ravel(), np.zeros(4)))
         box = self._view.box(Spheres(corners, np.zeros(4)), self._size)
         if box:
-            share = self._mean(self._shadow(dark, light, box.times(self._samples)))
+            share = self._shadow(dark, light, box)
             self._colors[box.part] *= 1.0 - (1.0 - _SHADOW) * share[:, :, np.newaxis]
 
     def draw_solid(self, scene: RenderScene, box: PixelRegion) -> None:
@@ -122,18 +126,15 @@ class Compositor:
         mean: Samples = total * np.float32(1.0 / edge**2)
         return mean
 
-    def _shadow(self, dark: BoolArray, light: CameraPose, fine: PixelRegion) -> Samples:
-        """1 where the samples (h, w) of a part of the picture see ground without light, else 0.
+    def _shadow(self, dark: BoolArray, light: CameraPose, box: PixelRegion) -> Samples:
+        """The share of the pixels (h, w) of a part of the picture that see ground without light.
 
         `dark` is where something that casts a shadow is seen from the light.
         """
-        rows = np.arange(fine.top + 0.5, fine.bottom)
-        columns = np.arange(fine.left + 0.5, fine.right)
-        x, y = ground.places(self._view, self._fine_size, rows, columns)
-        there = np.isfinite(x) & np.isfinite(y)
-        points = np.stack([np.where(there, axis, 0.0).ravel() for axis in (x, y, np.zeros_like(x))])
         height, width = dark.shape
-        row, column = light.pixels(points, (width, height)).reshape(2, *x.shape)
-        there &= (row >= 0) & (row < height) & (column >= 0) & (column < width)
-        shadow: Samples = (there & dark[row * there, column * there]).astype(np.float32)
-        return shadow
+        seen = ground.seen_places(self._view, self._fine_size)
+        places = fixed_order.product(ground.seen_from(light, (width, height)), seen)
+        fine = box.times(self._samples)
+        share = np.zeros((box.bottom - box.top, box.right - box.left), dtype=np.float32)
+        add_shadow(dark, np.vstack((places, seen[2])), (fine.top, fine.left), self._samples, share)
+        return share

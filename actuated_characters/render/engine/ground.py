@@ -1,4 +1,4 @@
-"""The plane z = 0 as a chequerboard: what a view sees of it, by geometry. No engine.
+"""The plane z = 0 as a chequerboard: what a view sees of it, by geometry.
 
 It always has one grid, that of the world, so that it shows how far a character has gone. Upright
 pictures see one row of pixels of it in one distance along the camera's axis.
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from actuated_characters.render.engine.camera_pose import CameraPose, Size
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import fixed_order
 
 Samples: TypeAlias = NDArray[np.float32]
 """Colours, 0 to 255, and shares of them; single precision is enough and twice as fast."""
@@ -34,7 +35,7 @@ def depths(view: CameraPose, height: int, rows: FloatArray) -> FloatArray:
     _, up, back = view.axes()
     falls = float(back[2]) - view.pixel(height) * (0.5 * height - rows) * float(up[2])
     eye = float(view.eye()[2])
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         depth: FloatArray = np.where((falls > 0.0) & (eye > 0.0), eye / falls, np.inf)
     return depth
 
@@ -59,6 +60,37 @@ def places(
             for axis in (0, 1)
         )
     return x, y
+
+
+def seen_places(view: CameraPose, size: Size) -> FloatArray:
+    """The projective map (3, 3) of a place in the picture (column, row, 1), to one of the ground.
+
+    It gives x and y in m, both times a third number, and that number, which is above 0 where the
+    ground is seen; nowhere if the camera is not above it.
+    """
+    width, height = size
+    right, up, back = view.axes()
+    x, y, z = view.eye().tolist()
+    scale = view.pixel(height)
+    corner = 0.5 * scale * (height * up - width * right) - back  # the direction of the first one
+    to_x, to_y, to_z = np.column_stack((scale * right, -scale * up, corner))
+    if z <= 0.0:
+        return np.zeros((3, 3))
+    return np.array((z * to_x - x * to_z, z * to_y - y * to_z, -to_z))
+
+
+def seen_from(light: CameraPose, size: Size) -> FloatArray:
+    """The projective map (3, 3) of a place of the ground (x, y, 1), m, to one in a picture.
+
+    It gives column and row, both times a third number, and that number, which is above 0 before
+    the camera.
+    """
+    width, height = size
+    axes = light.axes()
+    from_eye = -fixed_order.apply(axes, light.eye())
+    across, upwards, back = np.column_stack((axes[:, :2], from_eye)) / light.pixel(height)
+    depth = -light.pixel(height) * back
+    return np.array((0.5 * width * depth + across, 0.5 * height * depth - upwards, depth))
 
 
 def colors(view: CameraPose, size: Size) -> Samples:

@@ -11,7 +11,7 @@ from actuated_characters.render.engine.visual_shapes import drawn_shapes, outlin
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
-from msgs_config.geometry import rotations
+from msgs_config.geometry import fixed_order, rotations
 
 _BELOW_GROUND = 0.1  # share of its height that a character may reach below the ground
 
@@ -122,8 +122,9 @@ class PosedCharacters:
         origin, turn_xyzw = frames[0][force.link], frames[1][force.link]
         local, radii = self._around[force.link]
         at = origin + rotations.rotate(turn_xyzw, force.point)
-        direction = force.arrow / np.linalg.norm(force.arrow)
-        outside = (at - origin - rotations.rotate(turn_xyzw, local)) @ direction + radii
+        direction = force.arrow / fixed_order.norm(force.arrow)
+        along = fixed_order.dot(at - origin - rotations.rotate(turn_xyzw, local), direction)
+        outside = along + radii
         tip = at - float(np.max(outside, initial=0.0)) * direction
         return np.array((tip - longest * force.arrow, tip))
 

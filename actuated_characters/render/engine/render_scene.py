@@ -1,45 +1,70 @@
-"""The shapes that are seen, in an engine that has no physics, and its drawings of them.
-
-The engine's software renderer draws them: no window, no GPU, the same picture each time.
-"""
+"""The shapes that are seen, each of them shown or not, and their drawings."""
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
+from actuated_characters.render.engine import rasteriser
 from actuated_characters.render.engine.camera_pose import CameraPose, PixelRegion, Size
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
-from actuated_characters.render.engine.surfaces import arrow_surface, round_surface
-from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.meshes.triangles import file_for_engine
+from actuated_characters.render.engine.shape_meshes import (
+    NO_TEXTURE,
+    TexturedSurface,
+    textured_surface_of,
+)
+from actuated_characters.render.engine.surfaces import arrow_surface
+from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
-from msgs_config.errors import CharacterError
-from msgs_config.geometry import rotations
-from msgs_config.geometry.surface import Surface
-from sim_node.physics.bullet.c_library import c_numbers, captured_output
-from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
+from msgs_config.character.terrain import terrain_shapes
+from msgs_config.geometry import fixed_order, rotations
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
-# In view distances: what is nearer or farther is not drawn.
-_NEAR_PLANE, _FAR_PLANE = 0.02, 50.0
-_LIGHT = {"lightAmbientCoeff": 0.6, "lightDiffuseCoeff": 0.45, "lightSpecularCoeff": 0.0}
+_NEAR_PLANE = 0.02  # view distances: what is nearer is not drawn
 _TERRAIN_COLOR = (0.78, 0.76, 0.70, 1.0)
 _ARROW_COLOR = (0.86, 0.08, 0.24, 1.0)
 _BALL_COLOR = (0.25, 0.25, 0.28, 1.0)
-_OUT_OF_VIEW = (0.0, 0.0, -1e6)  # m, where no view looks
+_SEEN, _CASTS_SHADOW = 1, 2  # marks of samples in which there is something
 
 
 class Drawing(NamedTuple):
-    """A part of a picture as the engine draws it, one sample a pixel."""
+    """A part of a picture, one sample a pixel."""
 
     color: Samples  # (h, w, 3): red, green, blue, 0 to 255
     depth: Samples  # (h, w): distance from the camera along its axis, m; infinite: nothing
     casts_shadow: BoolArray  # (h, w): whether it is a link or a ball
+
+
+class _Body(NamedTuple):
+    """A surface where it is shown."""
+
+    skin: TexturedSurface
+    color: Quadruple
+    origin: FloatArray  # (3,), m, world
+    axes: FloatArray  # (3, 3): its own as columns, in the world, of length one or scaled
+    mark: int
+
+
+class _Skins(NamedTuple):
+    """The surfaces of shapes in their own frames, and where these are in others."""
+
+    surfaces: list[TexturedSurface]
+    colors: list[Quadruple]
+    origins: FloatArray  # (b, 3), m
+    axes: FloatArray  # (b, 3, 3), as columns
+
+    @classmethod
+    def of(cls, shapes: Sequence[Shape]) -> "_Skins":
+        poses = [shape.pose for shape in shapes]
+        turns_xyzw = np.array([pose.orientation_xyzw for pose in poses]).reshape(-1, 4)
+        return cls(
+            [textured_surface_of(shape) for shape in shapes],
+            [shape.color_rgba for shape in shapes],
+            np.array([pose.position for pose in poses]).reshape(-1, 3),
+            rotations.matrix(turns_xyzw),
+        )
 
 
 class RenderScene:
@@ -48,176 +73,81 @@ class RenderScene:
     def __init__(
         self, links: Sequence[tuple[Shape, ...]], terrain: UrdfOptions | None = None
     ) -> None:
-        """Start the engine, with the shapes of each link.
+        """Make the surfaces of the shapes of each link.
 
         Raises:
-            CharacterError: the engine refuses a shape or the terrain's URDF.
+            CharacterError: a mesh cannot be used, or the terrain's URDF.
         """
-        self._client = Engine()
-        self._links: list[tuple[int, int, Quadruple]] = []  # row of the link, body, colour
-        self._balls: list[tuple[float, int]] = []  # radius, body
-        self._arrows: list[int] = []  # bodies
-        self._terrain: tuple[int, Sequence[float], Sequence[float]] | None = None  # body and pose
-        try:
-            if terrain is not None:
-                self._add_terrain(terrain)
-            for row, shapes in enumerate(links):
-                self._links += [(row, self._add_shape(shape), shape.color_rgba) for shape in shapes]
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """End the engine."""
-        self._client.close()
+        self._links = _Skins.of([shape for shapes in links for shape in shapes])
+        self._rows = np.repeat(np.arange(len(links)), [len(shapes) for shapes in links])
+        self._terrain = _Skins.of([] if terrain is None else terrain_shapes(terrain))
+        self._ball = textured_surface_of(Shape(ShapeType.SPHERE, (1.0,)))
+        self._shown: list[_Body] = []
 
     def clear(self) -> None:
         """Show nothing."""
-        hidden = [body for _, body, _ in self._links] + [body for _, body in self._balls]
-        hidden += [] if self._terrain is None else [self._terrain[0]]
-        for body in hidden:
-            self._put(body, _OUT_OF_VIEW)
-        self._remove(self._arrows)
-        self._arrows = []
+        self._shown = []
 
     def show_links(self, frames: Frames, colors: Sequence[Quadruple | None]) -> None:
-        """Put the links where their frames are, NaN hides one; None is a link's own colour."""
-        for row, body, own_color in self._links:
-            origin, turn_xyzw = frames[0][row], frames[1][row]
-            if np.isnan(origin).any():
-                self._put(body, _OUT_OF_VIEW)
-            else:
-                self._put(body, origin, turn_xyzw)
-            red, green, blue, _ = colors[row] or own_color
-            self._paint(body, -1, (red, green, blue, 1.0))  # the engine draws nothing transparent
+        """Show the links where their frames are, NaN hides one; None is a link's own colour."""
+        skins, (origins, turns_xyzw) = self._links, frames
+        turns = rotations.matrix(turns_xyzw[self._rows])
+        places = origins[self._rows] + fixed_order.apply(turns, skins.origins)
+        axes = fixed_order.product(turns, skins.axes)
+        for number, row in enumerate(self._rows.tolist()):
+            color = colors[row] or skins.colors[number]
+            skin, place = skins.surfaces[number], places[number]
+            self._shown.append(_Body(skin, color, place, axes[number], _CASTS_SHADOW))
 
     def show_terrain(self) -> None:
         """Show the terrain, if there is one."""
-        if self._terrain is not None:
-            self._put(*self._terrain)
+        skins = self._terrain
+        for skin, origin, axes in zip(skins.surfaces, skins.origins, skins.axes, strict=True):
+            self._shown.append(_Body(skin, _TERRAIN_COLOR, origin, axes, _SEEN))
 
     def show_balls(self, balls: FloatArray) -> None:
-        """Show these balls, of which centres and radii (m, 4) are given in m, and no others."""
-        radii = balls[:, 3].tolist()
-        if [radius for radius, _ in self._balls] != radii:
-            self._remove(body for _, body in self._balls)
-            spheres = [Shape(ShapeType.SPHERE, (r,), color_rgba=_BALL_COLOR) for r in radii]
-            self._balls = list(zip(radii, map(self._add_shape, spheres), strict=True))
-        for (_, body), ball in zip(self._balls, balls, strict=True):
-            self._put(body, ball[:3])
+        """Show balls, of which centres and radii (m, 4) are given in m."""
+        for ball in balls:
+            axes = ball[3] * np.eye(3)
+            self._shown.append(_Body(self._ball, _BALL_COLOR, ball[:3], axes, _CASTS_SHADOW))
 
     def show_arrows(self, arrows: Iterable[FloatArray], radius: float) -> None:
-        """Show these arrows, too, none of length zero: tail and tip (2, 3); shafts' radius; m."""
+        """Show arrows, none of length zero: tail and tip (2, 3); their shafts' radius; m."""
         for tail, tip in arrows:
-            length = float(np.linalg.norm(tip - tail))
-            body = self._add_body(_ARROW_COLOR, **_triangles(arrow_surface(length, radius)))
-            self._put(body, tail, _turn_from_z((tip - tail) / length))
-            self._arrows.append(body)
+            surface = arrow_surface(float(fixed_order.norm(tip - tail)), radius)
+            skin = TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)
+            axes = rotations.matrix(rotations.from_z(tip - tail))
+            self._shown.append(_Body(skin, _ARROW_COLOR, tail, axes, _SEEN))
 
     def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
-        near, far = _NEAR_PLANE * view.distance, _FAR_PLANE * view.distance
         width, height = size
-        step = view.pixel(height) * near  # a pixel on the near plane
-        columns, rows = box.right - box.left, box.bottom - box.top
-        _, _, rgba, depths, bodies = pybullet.getCameraImage(
-            columns,
-            rows,
-            pybullet.computeViewMatrix(view.eye().tolist(), view.target, view.axes()[1].tolist()),
-            pybullet.computeProjectionMatrix(
-                step * (box.left - 0.5 * width),
-                step * (box.right - 0.5 * width),
-                step * (0.5 * height - box.bottom),
-                step * (0.5 * height - box.top),
-                near,
-                far,
-            ),
-            lightDirection=LIGHT_VIEW.axes()[2].tolist(),
-            lightColor=(1.0, 1.0, 1.0),
-            shadow=0,
-            **_LIGHT,
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
-        color = np.reshape(rgba, (rows, columns, 4))[:, :, :3].astype(np.float32)
-        seen: IntArray = np.reshape(bodies, (rows, columns))
-        stored: Samples = np.reshape(depths, (rows, columns))
-        # The inverse of what graphics cards store.
-        depth: Samples = far * near / (far - (far - near) * stored)
-        depth[seen < 0] = np.inf
-        casting = [body for _, body, _ in self._links] + [body for _, body in self._balls]
-        return Drawing(color, depth, np.isin(seen, casting))
-
-    def _add_terrain(self, terrain: UrdfOptions) -> None:
-        body = load_urdf(self._client, terrain)
-        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
-            self._paint(body, link, _TERRAIN_COLOR)
-        pose = pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
-        self._terrain = (body, *pose)
-
-    def _add_shape(self, shape: Shape) -> int:
-        """A shape as a body at the origin."""
-        measures: dict[str, object]
-        if shape.type is ShapeType.BOX:
-            measures = {"halfExtents": [0.5 * edge for edge in shape.size]}
-        elif shape.type is ShapeType.MESH:
-            return self._add_mesh(shape)
-        else:
-            measures = _triangles(round_surface(shape))
-        return self._add_drawn(shape, measures)
-
-    def _add_mesh(self, shape: Shape) -> int:
-        with TemporaryDirectory() as directory:
-            file = file_for_engine(Path(shape.mesh), Path(directory), "mesh")
-            return self._add_drawn(shape, {"fileName": str(file), "meshScale": shape.size})
-
-    def _add_drawn(self, shape: Shape, measures: dict[str, object]) -> int:
-        measures["visualFramePosition"] = shape.pose.position
-        measures["visualFrameOrientation"] = shape.pose.orientation_xyzw
-        try:
-            return self._add_body(shape.color_rgba, **measures)
-        except pybullet.error as error:
-            raise CharacterError(f"cannot draw {shape.mesh or f'a {shape.type.value}'}") from error
-
-    def _add_body(self, color: Quadruple, **measures: object) -> int:
-        kind = pybullet.GEOM_BOX if "halfExtents" in measures else pybullet.GEOM_MESH
-        with captured_output(), c_numbers():  # the engine reads a mesh's file with the body
-            seen = pybullet.createVisualShape(
-                kind, rgbaColor=color, **measures, physicsClientId=self._client
+        shape = (box.bottom - box.top, box.right - box.left)
+        color = np.zeros((*shape, 3), dtype=np.float32)
+        inverses = np.zeros(shape, dtype=np.float32)
+        marks = np.zeros(shape, dtype=np.uint8)
+        middle = (0.5 * width - box.left, 0.5 * height - box.top)
+        lens = np.array((1.0 / view.pixel(height), *middle, _NEAR_PLANE * view.distance))
+        origins = np.array([body.origin for body in self._shown]).reshape(-1, 3)
+        turns = np.array([body.axes for body in self._shown]).reshape(-1, 3, 3)
+        seen_axes = fixed_order.product(view.axes(), turns)
+        seen_origins = fixed_order.apply(view.axes(), origins - view.eye())
+        lights = fixed_order.apply(turns.swapaxes(-1, -2), LIGHT_VIEW.axes()[2])
+        for number, body in enumerate(self._shown):
+            rasteriser.draw_triangles(
+                *body.skin.surface,
+                body.skin.uvs,
+                body.skin.texture,
+                255.0 * np.array(body.color[:3]),
+                seen_axes[number],
+                seen_origins[number],
+                lights[number] / fixed_order.norm(lights[number]),
+                lens,
+                body.mark,
+                color,
+                inverses,
+                marks,
             )
-            return int(pybullet.createMultiBody(0.0, -1, seen, physicsClientId=self._client))
-
-    def _put(
-        self,
-        body: int,
-        origin: FloatArray | Sequence[float],
-        turn_xyzw: FloatArray | Sequence[float] = rotations.IDENTITY_XYZW,
-    ) -> None:
-        pybullet.resetBasePositionAndOrientation(
-            body, origin, turn_xyzw, physicsClientId=self._client
-        )
-
-    def _paint(self, body: int, link: int, color: Quadruple) -> None:
-        pybullet.changeVisualShape(body, link, rgbaColor=color, physicsClientId=self._client)
-
-    def _remove(self, bodies: Iterable[int]) -> None:
-        for body in bodies:
-            pybullet.removeBody(body, physicsClientId=self._client)
-
-
-def _triangles(surface: Surface) -> dict[str, object]:
-    """A surface as the engine takes it."""
-    return {
-        "vertices": surface.vertices.tolist(),
-        "normals": surface.normals.tolist(),
-        "indices": surface.triangles.ravel().tolist(),
-        "uvs": [(0.0, 0.0)] * len(surface.vertices),
-    }
-
-
-def _turn_from_z(direction: FloatArray) -> FloatArray:
-    """The shortest turn xyzw (4,) that leads z to a unit vector (3,)."""
-    x, y, z = direction.tolist()
-    if z < -1.0 + 1e-9:
-        return np.array((1.0, 0.0, 0.0, 0.0))
-    return rotations.normalised(np.array((-y, x, 0.0, 1.0 + z)))
+        with np.errstate(divide="ignore"):
+            depth: Samples = np.float32(1.0) / inverses
+        return Drawing(color, depth, marks == _CASTS_SHADOW)

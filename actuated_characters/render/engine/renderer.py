@@ -17,6 +17,7 @@ from actuated_characters.render.engine.render_scene import RenderScene
 from actuated_characters.render.engine.surfaces import HEAD_WIDTH
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character, UrdfOptions, Vector
+from msgs_config.geometry import fixed_order
 
 __all__ = ["FrameSpec", "Picture", "Renderer"]
 
@@ -59,7 +60,7 @@ class Renderer:
         terrain: UrdfOptions | None = None,
         samples: int = 2,
     ) -> None:
-        """Start the engine.
+        """Make the surfaces of all that may be seen.
 
         Args:
             character: The character, or several.
@@ -77,16 +78,6 @@ class Renderer:
         self._has_ground = ground and self.posed.stand_on_ground()
         self._has_terrain = terrain is not None
         self._scene = RenderScene(self.posed.shapes, terrain)
-
-    def __enter__(self) -> "Renderer":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the engine."""
-        self._scene.close()
 
     def picture(self, frame: FrameSpec, size: Size) -> Picture:
         """A picture (h, w, 3) of a width and a height in pixels."""
@@ -124,7 +115,7 @@ class Renderer:
         balls = _NO_BALLS if frame.balls is None else frame.balls
         self._scene.show_balls(balls)
         if self._has_ground:
-            near = balls[np.linalg.norm(balls[:, :3] - view.target, axis=1) < view.distance]
+            near = balls[fixed_order.norm(balls[:, :3] - view.target) < view.distance]
             layers.darken_ground(self._scene, _with_balls(bodies, near))
         width, height = size
         everywhere = PixelRegion(0, height, 0, width)

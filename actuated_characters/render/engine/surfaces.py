@@ -1,4 +1,4 @@
-"""Round surfaces as triangles: the engine's own have so few that a sphere has corners."""
+"""Round surfaces as triangles."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Shape, ShapeType
+from msgs_config.geometry import elementary, fixed_order
 from msgs_config.geometry.surface import Surface
 
 HEAD_WIDTH = 3.0  # width of an arrow's head, in diameters of its shaft
@@ -21,7 +22,7 @@ def round_surface(shape: Shape) -> Surface:
     if shape.type is ShapeType.CYLINDER:
         return _polygon_revolved([(0.0, -half), (radius, -half), (radius, half), (0.0, half)])
     angle = np.linspace(0.0, 0.5 * np.pi, _ALONG_ARC)
-    lower = np.column_stack((np.sin(angle), -np.cos(angle)))
+    lower = np.column_stack((elementary.sin(angle), -elementary.cos(angle)))
     normals = np.concatenate((lower, lower[::-1] * (1.0, -1.0)))
     points = radius * normals
     points[:, 1] += half * np.repeat((-1.0, 1.0), _ALONG_ARC)
@@ -42,17 +43,18 @@ def _polygon_revolved(corners: Sequence[tuple[float, float]]) -> Surface:
     points = np.repeat(corners, 2, axis=0)[1:-1]
     along = points[1::2] - points[::2]
     outwards = np.column_stack((along[:, 1], -along[:, 0]))
-    outwards /= np.hypot(*outwards.T)[:, np.newaxis]
+    outwards /= fixed_order.norm(outwards)[:, np.newaxis]
     return _revolved(points, np.repeat(outwards, 2, axis=0))
 
 
 def _revolved(points: FloatArray, normals: FloatArray) -> Surface:
     """A profile turned about z: distances from the axis and heights (m, 2), from below upwards."""
     angle = np.linspace(0.0, 2.0 * np.pi, _FACES_AROUND_AXIS + 1)[:, np.newaxis]
+    cosine, sine = elementary.cos(angle), elementary.sin(angle)
 
     def turned(line: FloatArray) -> FloatArray:
         across, upwards = line.T
-        x, y = np.cos(angle) * across, np.sin(angle) * across
+        x, y = cosine * across, sine * across
         return np.stack((x, y, np.broadcast_to(upwards, x.shape)), axis=-1).reshape(-1, 3)
 
     count = len(points)

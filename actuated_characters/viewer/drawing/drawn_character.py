@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from actuated_characters.render.engine.camera_pose import Spheres
-from actuated_characters.render.engine.shape_meshes import triangles_of
+from actuated_characters.render.engine.shape_meshes import surface_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
@@ -112,7 +112,7 @@ class DrawnCharacter:
         )
 
     def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
-        vertices, faces = triangles_of(shape)
+        vertices, _, faces = surface_of(shape)
         red, green, blue, alpha = shape.color_rgba
         color = _GHOST if ghost else _rgb(255.0 * np.array((red, green, blue)))
         opacity = _GHOST_OPACITY if ghost else (None if alpha >= 1.0 else max(alpha, 0.1))

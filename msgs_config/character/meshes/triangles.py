@@ -16,6 +16,7 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray
 from msgs_config.character.meshes.check import check_mesh, is_stl_of_text
+from msgs_config.character.meshes.wavefront import read_wavefront
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import fixed_order
 from msgs_config.runtime.extras import require_extra
@@ -48,7 +49,9 @@ def file_for_engine(path: Path, directory: Path, name: str) -> Path:
 
 def check_readable(path: Path) -> None:
     """Raise CharacterError unless a mesh can be used; names its file."""
-    if is_converted(path):
+    if path.suffix.lower() == ".obj":
+        read_wavefront(path)
+    elif is_converted(path):
         _stl_of(path)
     else:
         check_mesh(path)
@@ -60,11 +63,9 @@ def read_vertices(path: Path) -> FloatArray:
     Raises:
         CharacterError: the mesh cannot be used; names its file.
     """
-    check_readable(path)
     if path.suffix.lower() == ".obj":
-        lines = path.read_text(encoding="latin-1").split("\n")
-        rows = [line.split() for line in lines if line.lstrip().startswith("v")]
-        return np.array([row[1:4] for row in rows if row[0] == "v"], dtype=float)
+        return read_wavefront(path).vertices.copy()
+    check_readable(path)
     stl = _stl_of(path) if is_converted(path) else path.read_bytes()
     corners = np.frombuffer(stl, _STL_TRIANGLE, offset=_STL_HEADER_BYTES + 4)["corners"]
     return corners.reshape(-1, 3).astype(float)

@@ -13,7 +13,7 @@ from actuated_characters.render.engine.camera_pose import (
     framing,
     natural_aspect,
 )
-from tests.support.pictures import points_at
+from tests.support.pictures import pixels_of
 
 coordinates = st.floats(-5.0, 5.0)
 views = st.builds(
@@ -49,20 +49,6 @@ def test_a_yaw_leads_to_the_side_of_x_and_a_pitch_upwards() -> None:
         CameraPose(distance=2.0, yaw=0.5 * pi, pitch=0.0).eye(), (2, 0, 0), atol=1e-15
     )
     assert CameraPose(distance=2.0, yaw=0.3, pitch=0.5).eye()[2] == pytest.approx(2.0 * sin(0.5))
-
-
-@given(views, st.integers(1, 40), st.integers(1, 40))
-def test_what_is_seen_at_a_pixel_is_seen_at_that_pixel(
-    view: CameraPose, width: int, height: int
-) -> None:
-    pixels = np.mgrid[:height, :width].reshape(2, -1)
-    depth = np.random.default_rng(1).uniform(0.5, 9.0, width * height)
-
-    points = points_at(view, pixels, depth, (width, height))
-
-    np.testing.assert_array_equal(view.pixels(points, (width, height)), pixels)
-    along = view.axes()[2] @ (view.eye()[:, np.newaxis] - points)
-    np.testing.assert_allclose(along, depth, rtol=1e-9)
 
 
 @given(
@@ -118,7 +104,7 @@ def test_a_box_has_all_that_is_seen_of_spheres(
     box = view.box(Spheres(np.array(centres), np.full(len(centres), radius)), size)
 
     before = (surface - view.eye()) @ view.axes()[2] < -1e-3
-    rows, columns = view.pixels(surface[before].T, size)
+    rows, columns = pixels_of(view, surface[before].T, size)
     seen = (rows >= 0) & (rows < size[1]) & (columns >= 0) & (columns < size[0])
     assert ((rows >= box.top) & (rows < box.bottom))[seen].all()
     assert ((columns >= box.left) & (columns < box.right))[seen].all()

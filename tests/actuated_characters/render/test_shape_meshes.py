@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from actuated_characters.render.engine.shape_meshes import triangles_of
+from actuated_characters.render.engine.shape_meshes import surface_of
 from msgs_config.character.model import Shape, ShapeType
 from msgs_config.errors import CharacterError
 
@@ -16,7 +16,7 @@ R, L = 0.1, 0.4
 
 def volume(shape: Shape) -> float:
     """By the divergence theorem; negative where triangles are seen from within."""
-    vertices, faces = triangles_of(shape)
+    vertices, _, faces = surface_of(shape)
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     return float((a * np.cross(b, c)).sum() / 6.0)
 
@@ -52,5 +52,5 @@ def test_a_broken_mesh_is_one_clear_line(tmp_path: Path) -> None:
     file.write_text("v 0 0\nf 1 2 x\n")
 
     with pytest.raises(CharacterError, match=r"broken\.obj") as error:
-        triangles_of(Shape(ShapeType.MESH, (1.0, 1.0, 1.0), mesh=str(file)))
+        surface_of(Shape(ShapeType.MESH, (1.0, 1.0, 1.0), mesh=str(file)))
     assert "\n" not in str(error.value)

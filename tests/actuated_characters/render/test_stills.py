@@ -69,11 +69,11 @@ def test_a_strip_has_the_states_nearest_to_the_times(recording: Recording, walk:
 
     positions = np.stack([walk.states[row].position for row in (0, 10, 60)])
     assert whole.shape == (80, 3 * 60 + 2 * GAP, 3)
-    with Renderer(walk.plan.character) as camera:
-        view = view_of(camera, positions, size=SIZE)
-        for position, tile in zip(positions, tiles(whole, 3), strict=True):
-            own = followed(camera, view, positions[0], position)
-            np.testing.assert_array_equal(tile, take_picture(camera, position, view=own, size=SIZE))
+    camera = Renderer(walk.plan.character)
+    view = view_of(camera, positions, size=SIZE)
+    for position, tile in zip(positions, tiles(whole, 3), strict=True):
+        own = followed(camera, view, positions[0], position)
+        np.testing.assert_array_equal(tile, take_picture(camera, position, view=own, size=SIZE))
 
 
 def test_a_number_of_pictures_goes_evenly_from_the_first_state_to_the_last(

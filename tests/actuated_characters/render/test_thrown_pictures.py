@@ -80,14 +80,14 @@ def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recordi
 
 @pytest.mark.parametrize("ground", [False, True])
 def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
-    with Renderer(HUMANOID, ground=ground) as camera:
-        view = view_of(camera, REST, size=SIZE)
-        ball = np.array([[*view.target, 0.15]])
-        ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
+    camera = Renderer(HUMANOID, ground=ground)
+    view = view_of(camera, REST, size=SIZE)
+    ball = np.array([[*view.target, 0.15]])
+    ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
 
-        empty = take_picture(camera, REST, view=view, size=SIZE)
-        full = take_picture(camera, REST, view=view, size=SIZE, balls=ball)
-        again = take_picture(camera, REST, view=view, size=SIZE)
+    empty = take_picture(camera, REST, view=view, size=SIZE)
+    full = take_picture(camera, REST, view=view, size=SIZE, balls=ball)
+    again = take_picture(camera, REST, view=view, size=SIZE)
 
     differs = (empty != full).any(axis=2)
     rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -103,14 +103,14 @@ def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
 
 
 def test_a_ball_behind_the_character_is_hidden() -> None:
-    with Renderer(HUMANOID, ground=False) as camera:
-        view = view_of(camera, REST, size=SIZE)
-        behind = np.array([[*view.target, 0.02]])
-        behind[0, :3] -= 1.0 * view.axes()[2]
-        behind[0, 2] += 0.1
+    camera = Renderer(HUMANOID, ground=False)
+    view = view_of(camera, REST, size=SIZE)
+    behind = np.array([[*view.target, 0.02]])
+    behind[0, :3] -= 1.0 * view.axes()[2]
+    behind[0, 2] += 0.1
 
-        empty = take_picture(camera, REST, view=view, size=SIZE)
-        full = take_picture(camera, REST, view=view, size=SIZE, balls=behind)
+    empty = take_picture(camera, REST, view=view, size=SIZE)
+    full = take_picture(camera, REST, view=view, size=SIZE, balls=behind)
 
     assert np.array_equal(empty, full)
 

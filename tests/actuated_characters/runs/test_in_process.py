@@ -162,12 +162,13 @@ def test_a_signal_whose_handler_raises_nothing_ends_it_all_the_same(tmp_path: Pa
 
 
 def test_real_time_is_the_walls(tmp_path: Path) -> None:
-    plan = make_plan("pendulum", 0.3, {}, {"real_time_factor": 1.0}, {})
-    prepare_directory(tmp_path / "run", overwrite=False)
+    plan, walls = make_plan("pendulum", 0.3, {}, {"real_time_factor": 1.0}, {}), []
+    for attempt in ("first", "second", "third"):  # others may hold a run up, but not every one
+        prepare_directory(tmp_path / attempt, overwrite=False)
+        run_in_process(plan, tmp_path / attempt)
+        walls.append(read_metrics(tmp_path / attempt)[0]["wall_time_s"])
 
-    run_in_process(plan, tmp_path / "run")
-
-    assert read_metrics(tmp_path / "run")[0]["wall_time_s"] == pytest.approx(0.3, abs=0.1)
+    assert min(walls) == pytest.approx(0.3, abs=0.1)
 
 
 def test_an_input_that_the_simulator_rejects_is_said(tmp_path: Path) -> None:
