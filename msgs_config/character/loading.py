@@ -18,7 +18,7 @@ from msgs_config.character.joints.followers import add_mimics, check_followers, 
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.links.reading import read_links
 from msgs_config.character.meshes.resolving import resolve_meshes
-from msgs_config.character.meshes.triangles import check_readable
+from msgs_config.character.meshes.triangles import check_for_engine
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
@@ -162,7 +162,7 @@ def _check_meshes(robot: ElementTree.Element, urdf: Path) -> None:
     names = [mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")]
     for name in dict.fromkeys(names):
         try:
-            check_readable(Path(name))
+            check_for_engine(Path(name))
         except CharacterError as error:
             raise CharacterError(f"{urdf}: {error}") from error
 

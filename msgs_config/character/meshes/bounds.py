@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.meshes.triangles import read_vertices
+from msgs_config.character.meshes.triangles import check_for_engine, read_vertices
 from msgs_config.errors import CharacterError
 from msgs_config.geometry.scalars import Vector
 
@@ -39,9 +39,9 @@ def bounds_of_parts(path: Path, factors: Sequence[float]) -> list[Bounds]:
 @lru_cache(maxsize=64)  # a process reads each mesh several times
 def _unscaled(path: Path, modified_ns: int, size: int) -> tuple[Bounds, ...]:
     del modified_ns, size
-    vertices = read_vertices(path)  # which checks it
+    check_for_engine(path)
     if path.suffix.lower() != ".obj":
-        return (_corners(vertices),)
+        return (_corners(read_vertices(path)),)
     points, parts = list[Sequence[float]](), list[list[int]](([],))
     for kind, pieces in _lines(path.read_text(encoding="latin-1")):
         if kind == "v":
