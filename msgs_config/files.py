@@ -26,6 +26,8 @@ MAX_XML_CHARACTERS = 2 * 1024 * 1024
 MAX_XML_NESTING = 64
 _PACKAGE = "package://"
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+_REMEDIES = {"pybullet_data": "; it comes with PyBullet: pip install pybullet"}
+"""By the package's name, how to get one that the shipped characters' files name."""
 _LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification
 _BYTE_ORDER_MARKS = (  # UTF-32's little-endian one begins as UTF-16's does
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -44,7 +46,8 @@ _DECLARED_ENCODING = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-
 def resolve(path: str, relative_to: Path, error: type[ActuatedCharactersError]) -> Path:
     """The path that `package://NAME/...`, an absolute or a relative path stands for.
 
-    NAME is a ROS package or an importable Python package, such as `pybullet_data`.
+    NAME is a ROS package or an importable Python package, such as `pybullet_data`, which is not
+    imported.
 
     Raises:
         error: the package is not installed.
@@ -63,7 +66,8 @@ def _package_directory(package: str, error: type[ActuatedCharactersError]) -> Pa
         spec = importlib.util.find_spec(package) if package.isidentifier() else None
         if spec is not None and spec.submodule_search_locations:
             return Path(spec.submodule_search_locations[0])
-    raise error(f"package '{package}' is not installed")
+    remedy = _REMEDIES.get(package, "")
+    raise error(f"package '{package}' is not installed{remedy}")
 
 
 def read_text(path: Path, error: type[ActuatedCharactersError], most: int | None = None) -> str:

@@ -12,11 +12,11 @@ import pybullet_data
 
 from actuated_characters.metrics.run_metrics import Tick
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
-from msgs_config.character.c_library import captured_output
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.c_library import captured_output
+from sim_node.physics.bullet.client import pybullet
 
 _DATA = Path(pybullet_data.getDataPath())
 _LARGEST_EFFORTS = [0.0] * 7 + [1e3] * 36  # a floating base, then ball joints as quaternions

@@ -1,7 +1,6 @@
-"""Makes a `Character` of its YAML file and of its URDF as the engine understands it.
+"""Makes a `Character` of its YAML file and of its URDF.
 
-The engine's own numbers are taken (mass, principal inertia, frames), so that the simulator and
-the controller's model of the dynamics are built from the same ones.
+The simulator and the controller's model of the dynamics are built from the same numbers.
 """
 
 import math
@@ -9,18 +8,17 @@ import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.file import CharacterFile, read_character_file
 from msgs_config.character.file_defaults import add_defaults
 from msgs_config.character.joints.followers import add_mimics, check_followers, couple_rest_pose
-from msgs_config.character.layout import ROOT, SCALAR, JointLayout, JointType
-from msgs_config.character.link_order import sort_depth_first
+from msgs_config.character.layout import ROOT, JointLayout, JointType
+from msgs_config.character.links.reading import read_links
 from msgs_config.character.meshes.resolving import resolve_meshes
+from msgs_config.character.meshes.triangles import check_for_engine
 from msgs_config.character.model import (
     ROOT_TORQUE,
     Character,
@@ -29,23 +27,19 @@ from msgs_config.character.model import (
     Joint,
     Link,
     Pose,
+    UrdfOptions,
     layout_of,
 )
 from msgs_config.character.sensors import check_sensors
 from msgs_config.character.shapes import read_shapes
-from msgs_config.character.urdf.comparison import check_links
+from msgs_config.character.urdf.inertia import read_inertial
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError, LayoutError, one_of
 from msgs_config.geometry import rotations
 from msgs_config.mappings import show_value
 from msgs_config.plain_values import as_plain
 
-_JOINT_TYPES = {
-    pybullet.JOINT_REVOLUTE: JointType.REVOLUTE,
-    pybullet.JOINT_PRISMATIC: JointType.PRISMATIC,
-    pybullet.JOINT_SPHERICAL: JointType.SPHERICAL,
-    pybullet.JOINT_FIXED: JointType.FIXED,
-}
+_MAX_MASS_DIFFERENCE = 1e-9  # share of all links' mass that a repair may lose by rounding
 
 
 def load_character(name_or_path: str | os.PathLike[str], collides: bool = True) -> Character:
@@ -115,34 +109,22 @@ def _clip_format(file: CharacterFile, layout: JointLayout) -> ClipFormat:
 
 
 def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
-    """The links of a repaired URDF as the engine has them, each subtree in a row, with shapes."""
-    shapes = read_shapes(robot, file.loading)
-    client = Engine()
-    try:
-        links = _read_links(client, load_urdf(client, file.loading), file)
-    finally:
-        client.close()
-    _check_links(file.loading.urdf_path, links)
-    check_links(links, robot, file.loading)
+    """The links of a repaired URDF with their shapes, each subtree in a row."""
+    loading = file.loading
+    shapes = read_shapes(robot, loading)
+    if loading.collisions:
+        _check_meshes(robot, loading.urdf_path)
+    links = read_links(robot, loading)
+    _check_links(loading.urdf_path, links)
+    _check_mass(robot, loading)
+    joints = [replace(links[0].joint, pose_in_parent=_pose_fixed_base(file))]
+    joints += [_apply_file(link.joint, file) for link in links[1:]]
     return [
-        replace(link, shapes=shapes[link.name][0], collision_shapes=shapes[link.name][1])
-        for link in sort_depth_first(links)
+        replace(
+            link, joint=joint, shapes=shapes[link.name][0], collision_shapes=shapes[link.name][1]
+        )
+        for link, joint in zip(links, joints, strict=True)
     ]
-
-
-def _read_links(client: Engine, body: int, file: CharacterFile) -> list[Link]:
-    """The links in the engine's order, each after its parent, the base first."""
-    base_type = JointType.FIXED if file.loading.fixed_base else JointType.FLOATING
-    base_name = pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()
-    base_joint = Joint(ROOT, base_type, pose_in_parent=_pose_fixed_base(file))
-    links = [_read_link(client, body, -1, base_name, -1, base_joint)]
-    for index in range(pybullet.getNumJoints(body, physicsClientId=client)):
-        info = pybullet.getJointInfo(body, index, physicsClientId=client)
-        parent, name = info[16] + 1, info[12].decode()
-        link = _read_link(client, body, index, name, parent, base_joint)
-        joint = _read_joint(info, links[parent].inertial_pose, link.inertial_pose)
-        links.append(replace(link, joint=_apply_file(joint, file)))
-    return links
 
 
 def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
@@ -175,44 +157,18 @@ def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
     )
 
 
-def _read_link(client: Engine, body: int, index: int, name: str, parent: int, joint: Joint) -> Link:
-    dynamics = pybullet.getDynamicsInfo(body, index, physicsClientId=client)
-    pose = Pose(position=dynamics[3], orientation_xyzw=dynamics[4])
-    return Link(name, parent, joint, dynamics[0], dynamics[2], pose)
-
-
-def _read_joint(info: tuple[Any, ...], parent_inertial: Pose, child_inertial: Pose) -> Joint:
-    """A joint from `getJointInfo`, whose frames are the links' inertial ones.
-
-    Its position is given in the parent's inertial frame, its axis in the child's, and its
-    orientation turns the parent's inertial frame into the child's.
-    """
-    parent_turn = np.array(parent_inertial.orientation_xyzw)
-    child_turn = np.array(child_inertial.orientation_xyzw)
-    offset, turn, axis = (np.array(info[index], dtype=float) for index in (14, 15, 13))
-    position = np.array(parent_inertial.position) + rotations.rotate(parent_turn, offset)
-    orientation = rotations.multiply(
-        rotations.multiply(parent_turn, rotations.conjugate(turn)), rotations.conjugate(child_turn)
-    )
-    x, y, z = rotations.rotate(child_turn, axis).tolist()
-    joint_type = _JOINT_TYPES[info[2]]
-    is_scalar = joint_type in SCALAR
-    limited = is_scalar and info[8] <= info[9]
-    return Joint(
-        name=info[1].decode(),
-        type=joint_type,
-        axis_in_child=(x, y, z),
-        pose_in_parent=Pose.of_arrays(position, orientation),
-        lower=float(info[8]) if limited else -math.inf,
-        upper=float(info[9]) if limited else math.inf,
-        effort_limit=float(info[10]) if info[10] > 0.0 else math.inf,
-        damping=float(info[6]) if is_scalar else 0.0,
-        friction=float(info[7]) if is_scalar else 0.0,
-    )
+def _check_meshes(robot: ElementTree.Element, urdf: Path) -> None:
+    """Check that the meshes that are collided with can be used, each file once."""
+    names = [mesh.get("filename", "") for mesh in robot.iterfind("link/collision//mesh")]
+    for name in dict.fromkeys(names):
+        try:
+            check_for_engine(Path(name))
+        except CharacterError as error:
+            raise CharacterError(f"{urdf}: {error}") from error
 
 
 def _check_links(urdf: Path, links: list[Link]) -> None:
-    """Check numbers, which overflow where the engine computes with them, and joints' names."""
+    """Check numbers, of which large ones have overflown, and joints' names."""
     for link in links:
         poses = (link.inertial_pose, link.joint.pose_in_parent)
         numbers = [number for pose in poses for number in (*pose.position, *pose.orientation_xyzw)]
@@ -225,6 +181,20 @@ def _check_links(urdf: Path, links: list[Link]) -> None:
             raise CharacterError(
                 f"{urdf}: a joint is named '{joint.name}', which is the floating base's"
             )
+
+
+def _check_mass(repaired: ElementTree.Element, loading: UrdfOptions) -> None:
+    """Check that a URDF's repair has neither lost mass nor made any, unless it filled it in."""
+    before, after = (
+        math.fsum(read_inertial(link).mass for link in robot.findall("link"))
+        for robot in (loading.robot, repaired)
+    )
+    if loading.fill_inertia and before == 0.0:
+        return
+    if abs(after - before) > _MAX_MASS_DIFFERENCE * before:
+        raise CharacterError(
+            f"{loading.urdf_path}: all links have {after:.6g} kg; the URDF's text has {before:.6g}"
+        )
 
 
 def _check_names(file: CharacterFile, layout: JointLayout, fixed: frozenset[str]) -> None:

@@ -11,9 +11,9 @@ import pybullet
 import pytest
 
 import actuated_characters as ac
-from msgs_config.character.bullet import Engine
 from msgs_config.errors import CharacterError, ClosedError
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.bullet.client import Engine
 from tests.support.physics import character as shared_character
 from tests.support.urdf import inertial, joint, link, robot
 

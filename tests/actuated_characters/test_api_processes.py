@@ -145,7 +145,7 @@ def test_threads_lose_no_output_while_others_load() -> None:
 WORLDS_IN_THREADS = """
 import threading, time
 import actuated_characters as ac
-from msgs_config.character.bullet import pybullet
+from sim_node.physics.bullet.client import pybullet
 
 def walk(threshold, hashes):
     character = ac.load_character("humanoid")
@@ -273,4 +273,4 @@ def test_commands_run_where_there_is_no_output(closed: str, tmp_path: Path) -> N
 
 
 def test_the_import_of_the_engine_says_nothing() -> None:
-    assert output_of("import msgs_config.character.bullet") == ""
+    assert output_of("import sim_node.physics.bullet.client") == ""

@@ -21,8 +21,8 @@ from lecture.framework.tracking import (
     overshoot,
 )
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.settings import WorldSettings
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import LoneWorld, character

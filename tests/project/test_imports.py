@@ -22,7 +22,7 @@ ROS_NAMES = re.compile(
 )
 COMPOSED = "actuated_characters/composed"
 ENGINES = {  # who imports them; how far they are known beyond that is in pyproject.toml
-    "pybullet": {"msgs_config/character/bullet.py"},
+    "pybullet": {"sim_node/physics/bullet/client.py"},
     "mujoco": {
         "msgs_config/character/dynamics.py",
         "msgs_config/character/mujoco_model.py",
@@ -81,7 +81,7 @@ def assert_nothing_wrong(
 
 def test_there_are_sources_to_read() -> None:
     assert {source.split("/")[0] for source in SOURCES} == set(PACKAGES)
-    assert "pybullet" in roots_of("msgs_config/character/bullet.py")
+    assert "pybullet" in roots_of("sim_node/physics/bullet/client.py")
     assert "rclpy" in roots_of("msgs_config/runtime/process.py")  # imported inside a function
 
 

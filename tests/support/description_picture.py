@@ -20,11 +20,11 @@ from urdf_parser_py import urdf
 from actuated_characters.render.engine.camera_pose import CameraPose, Size
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
+from sim_node.physics.bullet.client import Engine, pybullet
 from tests.support.description import origin_matrix, parse
 from tests.support.ros import SimulatorClient
 from tests.support.transforms import TF2, Frames, environment_with_tf2

@@ -5,10 +5,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 
 
 def depths(character: Character, motion: GeneralizedPosition) -> dict[str, NDArray[np.float64]]:

@@ -17,7 +17,6 @@ from controller_node import parameters as for_controller
 from controller_node.controller import Controller
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.file import shipped_characters
 from msgs_config.character.layout import JointType
 from msgs_config.character.loading import load_character
@@ -26,6 +25,7 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
 from sim_node import parameters as for_simulator
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.engine import Body, make_world
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.settings import SimulationSettings, WorldSettings

@@ -39,8 +39,8 @@ def file_for_engine(path: Path, directory: Path, name: str) -> Path:
     Raises:
         CharacterError: the mesh cannot be used; names its file.
     """
+    check_for_engine(path)
     if not is_converted(path):
-        check_mesh(path)
         return path
     file = directory / f"{name}.stl"
     file.write_bytes(_stl_of(path))
@@ -51,7 +51,13 @@ def check_readable(path: Path) -> None:
     """Raise CharacterError unless a mesh can be used; names its file."""
     if path.suffix.lower() == ".obj":
         read_wavefront(path)
-    elif is_converted(path):
+    else:
+        check_for_engine(path)
+
+
+def check_for_engine(path: Path) -> None:
+    """Raise CharacterError unless an engine reads a mesh, or what is made of it; names its file."""
+    if is_converted(path):
         _stl_of(path)
     else:
         check_mesh(path)

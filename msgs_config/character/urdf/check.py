@@ -17,6 +17,8 @@ from msgs_config.errors import CharacterError
 MAX_LINKS = 2000
 MAX_POSITION_ENTRIES = 128  # beyond them PyBullet reads states as empty, without an error
 MAX_NAME_BYTES = 255
+MAX_ELEMENT_BYTES = 8000
+"""Of an element without those in it: Bullet breaks a line of more than 8191 bytes in two."""
 
 _TYPES = (*WITH_AXIS, "spherical", "fixed", FLOATING)
 _RIGHT_TYPES = (
@@ -97,7 +99,18 @@ def check_urdf(path: Path, text: str, limits: bool = True) -> ElementTree.Elemen
         _check_direction(path, joint)
         if limits:
             _check_limits(path, joint)
+    _check_lengths(path, robot)
     return robot
+
+
+def _check_lengths(path: Path, robot: ElementTree.Element) -> None:
+    for element in robot.iter():
+        texts = (element.tag, element.text, element.tail, *sum(element.attrib.items(), ()))
+        if sum(len(text.encode()) for text in texts if text) > MAX_ELEMENT_BYTES:
+            raise CharacterError(
+                f"{path}: an element of more than {MAX_ELEMENT_BYTES} bytes; "
+                "the engine cannot read it"
+            )
 
 
 def _check_name(path: Path, element: ElementTree.Element) -> None:

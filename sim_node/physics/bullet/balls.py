@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.bullet.client import Engine, pybullet
 
 _AWAY_DISTANCE = 10_000.0  # m along x: where a ball lies that was taken out of the way
 

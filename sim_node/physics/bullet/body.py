@@ -12,13 +12,14 @@ from typing import TypeAlias
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.bullet.balls import BulletBalls
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics
 from sim_node.physics.bullet.joint_constraints import couple_joints, set_friction
+from sim_node.physics.bullet.loaded_links import check_links
 from sim_node.physics.bullet.touches import TouchedLinks, net_wrenches
 
 _QUATERNION = 4  # numbers of a ball joint's position in the engine
@@ -52,7 +53,7 @@ class BulletBody:
         freedom; `touched` says what touched in the world's last step, whose balls are `balls`.
 
         Raises:
-            CharacterError: the engine refuses the URDF or a mesh.
+            CharacterError: the engine refuses the URDF or a mesh, or reads a link otherwise.
         """
         self._client, self._touched, self._ball_bodies = client, touched, balls
         self._layout = character.layout
@@ -92,6 +93,7 @@ class BulletBody:
         numbers = {info[1].decode(): info[0] for info in infos}
         # the engine's number of each link; -1 is the base
         self._numbers = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
+        check_links(self._client, self._body, self._numbers, character)
         self._row = {number: row for row, number in enumerate(self._numbers)}
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]
         self._joints = [numbers[joint.name] for joint in joints]

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import Engine, pybullet
 
 
 def set_link_dynamics(client: Engine, body: int, friction: float, speed_bound: float) -> None:

@@ -11,8 +11,8 @@ not depend on contacts is solved beforehand (`joint_resistance`).
 
 from collections.abc import Mapping, Sequence
 
-from msgs_config.character.bullet import Engine, pybullet
 from msgs_config.character.model import Character
+from sim_node.physics.bullet.client import Engine, pybullet
 from sim_node.physics.joint_resistance import COUPLING_CORRECTION
 
 _NO_LIMIT = 1e9  # N m or N: the force of a coupling is not limited

@@ -9,13 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
 from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.bullet.balls import BulletBalls
 from sim_node.physics.bullet.body import BulletBody
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from sim_node.physics.bullet.touches import Touch, TouchedLinks
 from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.settings import WorldSettings

@@ -379,7 +379,7 @@ def test_a_terrain_that_cannot_be_read_is_one_line_about_its_file(
 
 
 def test_pictures_need_no_engine() -> None:
-    modules = "'pybullet', 'msgs_config.character.bullet'"
+    modules = "'pybullet', 'sim_node.physics.bullet.client'"
     program = (
         "import sys, actuated_characters.render.engine.renderer\n"
         f"print([name for name in ({modules}) if name in sys.modules])"

@@ -80,7 +80,7 @@ def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...
 
 def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
     """The links of the character that a ball pushes, by the engine's own list."""
-    from msgs_config.character.bullet import pybullet
+    from sim_node.physics.bullet.client import pybullet
 
     body = run.characters[0]._body
     points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)

@@ -11,9 +11,9 @@ from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.throw_hits import States, find_hit
 from actuated_characters.runs.planned.throws import PlannedThrow
-from msgs_config.character.bullet import pybullet
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.simulation import Simulation
 from tests.support.physics import character
 from tests.support.thrown_states import watch_states

@@ -8,10 +8,10 @@ import pybullet_data
 import pytest
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.client import pybullet
 from tests.support.physics import character
 
 LAIKAGO = character("laikago")

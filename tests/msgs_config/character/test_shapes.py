@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import Engine, pybullet
-from msgs_config.character.c_library import captured_output
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Pose, Shape, ShapeType
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import rotations
+from sim_node.physics.bullet.c_library import captured_output
+from sim_node.physics.bullet.client import Engine, pybullet
 from tests.support.urdf import refusal
 
 ROBOTS = [

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.bullet import pybullet
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
+from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.mujoco import world as mujoco_world
 from sim_node.physics.mujoco.body import MujocoBody

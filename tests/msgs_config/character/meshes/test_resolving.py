@@ -10,13 +10,13 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from msgs_config.character.bullet import Engine, load_urdf, pybullet
-from msgs_config.character.c_library import captured_output
 from msgs_config.character.file import read_character_file, shipped_characters
 from msgs_config.character.loading import load_character
 from msgs_config.character.meshes import resolving as meshes
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
+from sim_node.physics.bullet.c_library import captured_output
+from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from tests.support.urdf import inertial, joint, link, refusal, robot, write_character
 
 CUBE = Path(pybullet_data.getDataPath()) / "cube.obj"

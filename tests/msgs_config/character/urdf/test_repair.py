@@ -1,6 +1,7 @@
 """A URDF as ROS means it: frames without mass, inertia of real bodies; nothing else is altered."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import pytest
 from controller_node.model_check import check_agreement
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Character
+from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.character.urdf.repair import Repairs
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.messages.probe import DynamicsSample
@@ -226,12 +228,31 @@ def test_a_link_that_the_engine_reads_otherwise_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As it would be without the repair of the text that the engine is given."""
-    monkeypatch.setattr("msgs_config.character.urdf.engine_text.repair_urdf", lambda *_: [])
-    write_character(tmp_path, robot(link("a", body(1.0, "1 2 4"))))
+    character = loaded(tmp_path, link("a", body(1.0, "1 2 4")))
+    monkeypatch.setattr("sim_node.physics.bullet.urdf_text.repair_urdf", lambda *_: [])
+
+    with pytest.raises(CharacterError) as caught:
+        measure_probe(character, 9.81)
+
+    assert "link 'a': the engine has an inertia in kg m^2 of 0 0 0" in str(caught.value)
+    assert str(tmp_path / "robot.urdf") in str(caught.value)
+
+
+def test_a_repair_that_loses_mass_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lose_a_link(robot: ElementTree.Element, loading: UrdfOptions) -> Repairs:
+        robot.remove(robot.findall("link")[1])
+        robot.remove(robot.findall("joint")[0])
+        return Repairs((), frozenset(), ())
+
+    monkeypatch.setattr("msgs_config.character.loading.repair_urdf", lose_a_link)
+    parts = link("a", body(1.0, "1 1 1")), link("b", body(2.5, "1 1 1")), hinge("a", "b")
+    write_character(tmp_path, robot(*parts))
 
     line = refusal(tmp_path / "robot.yaml")
 
-    assert "link 'a': the engine has an inertia in kg m^2 of 0 0 0" in line
+    assert "all links have 1 kg; the URDF's text has 3.5" in line
 
 
 def test_of_a_urdf_alone_a_mass_without_inertia_is_a_ball_of_water(tmp_path: Path) -> None:

@@ -6,13 +6,10 @@ from xml.etree import ElementTree
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.meshes.triangles import file_for_engine
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.urdf.check import NUMBERS
+from msgs_config.character.urdf.check import MAX_ELEMENT_BYTES, NUMBERS
 from msgs_config.character.urdf.limits import WITH_BOUNDS
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
-
-MAX_LINE_BYTES = 8000
-"""The engine reads lines of up to 8191 bytes, and breaks a longer one in two."""
 
 
 def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
@@ -39,9 +36,9 @@ def write_engine_urdf(loading: UrdfOptions, directory: Path) -> str:
     _write_defaults(robot)
     ElementTree.indent(robot)
     text = ElementTree.tostring(robot, encoding="unicode")
-    if any(len(line.encode()) > MAX_LINE_BYTES for line in text.splitlines()):
+    if any(len(line.encode()) > MAX_ELEMENT_BYTES for line in text.splitlines()):
         raise CharacterError(
-            f"{loading.urdf_path}: an element of more than {MAX_LINE_BYTES} bytes; "
+            f"{loading.urdf_path}: an element of more than {MAX_ELEMENT_BYTES} bytes; "
             "the engine cannot read it"
         )
     return text

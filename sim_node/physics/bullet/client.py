@@ -10,10 +10,10 @@ import weakref
 from pathlib import Path
 from typing import NoReturn
 
-from msgs_config.character.c_library import c_numbers, captured_output
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.urdf.engine_text import write_engine_urdf
 from msgs_config.errors import CharacterError, ClosedError, SimulationError
+from sim_node.physics.bullet.c_library import c_numbers, captured_output
+from sim_node.physics.bullet.urdf_text import write_engine_urdf
 
 with captured_output("stdout", "stderr"):
     import pybullet
