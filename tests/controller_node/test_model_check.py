@@ -185,8 +185,8 @@ def test_the_inertia_of_one_link_of_many_is_not_overlooked(link: str) -> None:
 def test_a_run_compares_before_it_starts_anything(monkeypatch: pytest.MonkeyPatch) -> None:
     real = measure_probe
 
-    def of_another_engine(whole: Character, gravity: float) -> DynamicsSample:
-        probe = real(whole, gravity)
+    def of_another_engine(whole: Character, gravity: float, engine: str) -> DynamicsSample:
+        probe = real(whole, gravity, engine)
         return replace(probe, kinetic_energy=1.5 * probe.kinetic_energy)
 
     monkeypatch.setattr("actuated_characters.runs.plan.measure_probe", of_another_engine)
