@@ -17,10 +17,12 @@ OF_EVERY_KIND = ["walk_480_delay", "reactive_hit", "panda_sine", "walk_reconstru
 SENSITIVE = "walk_explicit_pd_2khz"  # blows up the last bits of a rotation
 FEATURES: list[str] = np._core._multiarray_umath.__cpu_dispatch__
 
-# Every function whose last bits are numpy's choice gives the next double but one.
+# Every function whose last bits are numpy's choice gives the next double but one. What is compiled
+# is there before: it calls none of them, but numba looks for numpy's own as it begins.
 POISON = """
 import math
 import numpy as np
+import msgs_config.compiled.dynamics, msgs_config.compiled.message_form
 
 ELEMENTARY = (
     "sin cos tan sinh cosh tanh arcsin arccos arctan arctan2 exp exp2 expm1 log log2 log10 log1p "
