@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -105,8 +106,9 @@ def check_urdf(path: Path, text: str, limits: bool = True) -> ElementTree.Elemen
 
 def _check_lengths(path: Path, robot: ElementTree.Element) -> None:
     for element in robot.iter():
-        texts = (element.tag, element.text, element.tail, *sum(element.attrib.items(), ()))
-        if sum(len(text.encode()) for text in texts if text) > MAX_ELEMENT_BYTES:
+        attributes = chain.from_iterable(element.attrib.items())
+        whole = "".join((element.tag, element.text or "", element.tail or "", *attributes))
+        if len(whole.encode()) > MAX_ELEMENT_BYTES:
             raise CharacterError(
                 f"{path}: an element of more than {MAX_ELEMENT_BYTES} bytes; "
                 "the engine cannot read it"

@@ -157,8 +157,6 @@ def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
     ids=" ".join,
 )
 def test_other_runs_come_again_and_go_on(folder: Path, options: tuple[str, ...]) -> None:
-    if "predictive" in options:
-        pytest.importorskip("numba")
     original = folder / "original"
     limits = ("--clip", "walk", "--duration", "0.4", "--push", "chest:400,100,0@0.1")
     assert main(["run", *limits, *options, "--output", str(original), "--overwrite"]) == 0

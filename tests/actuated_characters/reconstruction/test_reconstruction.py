@@ -426,21 +426,6 @@ def test_a_mistake_is_one_line(
     assert last.startswith("error: ") and reason in last
 
 
-def test_without_numba_it_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in list(sys.modules):
-        compiled = name.startswith("controller_node.planner.") and "settings" not in name
-        if compiled or name.startswith("actuated_characters.reconstruction."):
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "numba", None)
-
-    code = main(["motion", "reconstruct", "--output", str(tmp_path / "walk.json")])
-
-    assert code == 1
-    assert "pip install 'actuated_characters[plan]'" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("early", [True, False], ids=["as processes begin", "later"])
 def test_ctrl_c_leaves_no_process_and_what_was_found(tmp_path: Path, *, early: bool) -> None:
     output, mark = tmp_path / "walk.json", f"{tmp_path}"

@@ -496,16 +496,6 @@ def test_it_knows_no_ground_but_the_plane() -> None:
         make_plan("humanoid", 0.1, {"reference": "hold"}, {"terrain": "none"}, QUICK)
 
 
-def test_without_numba_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [name for name in sys.modules if name.startswith("controller_node.planner.")]:
-        if name != "controller_node.planner.settings":
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "numba", None)
-
-    with pytest.raises(ConfigurationError, match="pip install 'actuated_characters\\[plan\\]'"):
-        a_controller()
-
-
 # Over topics
 
 
