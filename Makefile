@@ -4,6 +4,7 @@
 BIN := .venv/bin
 PACKAGING := setup.py setup.cfg pyproject.toml
 PYTHON ?=
+BULLET ?=
 SUPPORTED := import sys, ensurepip, venv; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
 
 # Robots of other makers, as data alone; most of these packages need much more than their files do.
@@ -25,6 +26,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
 	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 or 3.12)."
+	@echo "BULLET=1 compiles PyBullet where it has no wheel (from 3.12 on), BULLET=0 leaves it out: the engine is then MuJoCo."
 
 venv: .venv/.installed ## Set up .venv
 
@@ -115,28 +117,38 @@ distclean: clean ## Remove .venv too
 	    exit 1; \
 	fi; \
 	version=$$($$found -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
-	if [ $$version = 3.12 ]; then time="some minutes: pip compiles PyBullet"; else time="about a minute"; fi; \
+	if [ $$version != 3.11 ] && [ "$(BULLET)" = 1 ]; then time="some minutes: pip compiles PyBullet"; else time="about a minute"; fi; \
 	echo "setting up .venv with Python $$version ($$time) ..."; \
 	$$found -m venv --clear .venv
 	@touch $@
 
 .venv/.installed: $(PACKAGING) | .venv/.created
 	@echo "installing the package into .venv ..."
-	@$(BIN)/python -m pip install -qq -e '.[wheels]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@$(BIN)/python -c '$(COMPILE)'
+	$(call install,wheels)
 	@touch $@
 
 .venv/.installed-view: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its viewer into .venv ..."
-	@$(BIN)/python -m pip install -qq -e '.[wheels,view]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@$(BIN)/python -c '$(COMPILE)'
+	$(call install,wheels$(COMMA)view)
 	@touch .venv/.installed $@
 
 .venv/.installed-test: $(PACKAGING) | .venv/.created
 	@echo "installing the package and its test tools into .venv ..."
-	@$(BIN)/python -m pip install -qq -e '.[wheels,test]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
-	@$(BIN)/python -c '$(COMPILE)'
+	$(call install,wheels$(COMMA)test)
 	@touch .venv/.installed .venv/.installed-view $@  # it has their extras, too
 
-COMPILE := import sim_node.physics.soft_limits
+COMMA := ,
+PIP := $(BIN)/python -m pip
+# The package with its extras; then robots and clips, which are in PyBullet's wheel, where that
+# itself cannot be had; then what is compiled once.
+define install
+@$(PIP) install -qq -e '.[$(1)$(if $(filter 1,$(BULLET)),$(COMMA)bullet)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+$(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
+@$(BIN)/python -c '$(HAS_DATA)' || { echo "fetching the package pybullet_data (140 MB) ..." && $(FETCH) && $(BIN)/python -c '$(UNPACK)'; } || { echo "$(PIP_FAILED)" >&2; exit 1; }
+@$(BIN)/python -c '$(COMPILE)'
+endef
+HAS_DATA := import importlib.util, sys; sys.exit(importlib.util.find_spec("pybullet_data") is None)
+FETCH := $(PIP) download -qq --no-deps --only-binary :all: --implementation cp --python-version 3.11 --platform manylinux2014_x86_64 --dest build/pybullet pybullet==3.2.7
+UNPACK := import glob, sysconfig, zipfile; z = zipfile.ZipFile(glob.glob("build/pybullet/pybullet-*.whl")[0]); z.extractall(sysconfig.get_path("purelib"), [n for n in z.namelist() if n.startswith("pybullet_data/")])
+COMPILE := import actuated_characters.render.engine.render_scene, sim_node.physics.mujoco.world, sim_node.physics.soft_limits
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

@@ -59,7 +59,9 @@ setup(
         "numba>=0.61,<0.70",
         "numpy>=1.26,<3",
         "pillow>=9.1",  # textures of meshes; matplotlib needs it as well
-        "pybullet==3.2.7",  # exactly, likewise
+        # Exactly, likewise, where it has a wheel; elsewhere the engine is MuJoCo, and the package
+        # `pybullet_data`, which comes with it, is fetched as the Makefile does.
+        "pybullet==3.2.7; python_version < '3.12'",
         "pycollada>=0.9,<0.10",  # meshes of every eighth robot (1.7 MB, BSD-3, pure Python)
         "PyYAML>=6.0,<7",
         "rich>=13.7,<16",
@@ -72,6 +74,8 @@ setup(
             "ros-jazzy-rclpy>=7.1.6,<7.2",
             "ros-rclpy[fastrtps]>=7.1.6,<7.2",
         ],
+        # The engine Bullet where pip must compile it (eight minutes of a processor).
+        "bullet": ["pybullet==3.2.7"],
         # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).

@@ -15,6 +15,7 @@ from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from controller_node.parameters import make_controller
 from msgs_config.character.model import Character
+from sim_node.physics.engine import ENGINES
 
 _BLOCK, _BLOCKS, _WARM_UP = 32, 60, 3  # ticks; blocks of each, in turn
 _TICKS = _BLOCK * _BLOCKS + 1
@@ -40,9 +41,9 @@ def measure_engines(console: Console) -> list[Ratio]:
 
 def _ours(character: Character) -> dict[str, Callable[[], object]]:
     loops: dict[str, Callable[[], object]] = {}
-    for engine in ("bullet",):
+    for engine in ENGINES:
         controller = ac.Controller(character, clip="walk")
-        simulation = ac.Simulation(character, start=controller.start)
+        simulation = ac.Simulation(character, start=controller.start, engine=engine)
         loops[engine] = partial(_tick, controller, simulation)
     return loops
 

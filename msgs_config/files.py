@@ -26,7 +26,7 @@ MAX_XML_CHARACTERS = 2 * 1024 * 1024
 MAX_XML_NESTING = 64
 _PACKAGE = "package://"
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
-_REMEDIES = {"pybullet_data": "; it comes with PyBullet: pip install pybullet"}
+_REMEDIES = {"pybullet_data": "; it comes with PyBullet: pip install pybullet, or in a clone make venv"}
 """By the package's name, how to get one that the shipped characters' files name."""
 _LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification
 _BYTE_ORDER_MARKS = (  # UTF-32's little-endian one begins as UTF-16's does
