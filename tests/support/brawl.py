@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import pybullet
@@ -16,6 +17,7 @@ from msgs_config.character.loading import load_character
 from msgs_config.messages.state import StampedState
 from msgs_config.shared_parameters import placed
 from sim_node.parameters import load_parameters
+from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
@@ -87,7 +89,14 @@ def brawl_in_process(scene: Scene, ticks: int) -> Brawl:
 
 def _force_between(simulation: Simulation) -> float:
     """The normal forces in N between the two, of the last engine step."""
-    one, other = (each._body for each in simulation.characters)
+    one, other = (cast(Any, each._body) for each in simulation.characters)
+    if isinstance(one, MujocoBody):
+        data, first = one._world.data, other.place.links.start
+        bodies = one._world.model.geom_bodyid[data.contact.geom]
+        # the second one's links come last, the ground first
+        between = (bodies.min(axis=1) > 0) & (bodies.min(axis=1) < first)
+        between &= bodies.max(axis=1) >= first
+        return float(data.efc_force[data.contact.efc_address[between]].sum())
     points = pybullet.getContactPoints(
         bodyA=one._body, bodyB=other._body, physicsClientId=one._client
     )
