@@ -75,7 +75,10 @@ def test_the_clip_and_gravity_of_a_menu_come_with_the_next_reset(
     processes: Processes, client: Simulated, server: ViewerServer
 ) -> None:
     joints = ["root", *character("humanoid").layout.actuated_joint_names]
-    processes.simulator("humanoid", commanded_joints=joints, wait_for_subscribers=2)
+    # In real time: this client is slower than the simulation, and would lose what it waits for.
+    processes.simulator(
+        "humanoid", commanded_joints=joints, wait_for_subscribers=2, real_time_factor=1.0
+    )
     processes.controller("humanoid", reference="clip", clip="walk")
     episode, references = (
         client.listen(topics.EPISODE),
