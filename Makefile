@@ -26,7 +26,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
 	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 or 3.12)."
-	@echo "BULLET=1 compiles PyBullet where it has no wheel (from 3.12 on), BULLET=0 leaves it out: the engine is then MuJoCo."
+	@echo "BULLET=1 (in make venv) compiles PyBullet where it has no wheel (from 3.12 on), BULLET=0 leaves it out: the engine is then MuJoCo."
 
 venv: .venv/.installed ## Set up .venv
 

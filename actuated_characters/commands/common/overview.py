@@ -13,7 +13,7 @@ _PROGRAM = "actuated_characters"
 OVERVIEW = {
     "play": "a humanoid that walks in the browser, to be pushed; needs the extra 'view'",
     "play --scene brawl": "another scene",
-    "play --scene drive": "a humanoid that the arrow keys steer; needs 'view' and 'plan'",
+    "play --scene drive": "a humanoid that the arrow keys steer; needs the extra 'view'",
     'run --machine walk --cmd-vel "0.9,0,0.3@1" --duration 10': "walks by laws of balance",
     "motion import my_capture.bvh": "a clip of your own capture, for --clip",
     "run --clip walk --duration 20": "a recorded run, and its figures",

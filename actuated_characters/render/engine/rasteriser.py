@@ -278,6 +278,13 @@ def _shade(x: float, y: float, z: float, light: FloatArray) -> float:
 
 
 @compiled
+def _texel(place: float, count: int) -> int:
+    """Which of so many texels is at a place that repeats with each 1; 0 if that is no number."""
+    share = place - np.floor(place)
+    return min(int(share * count), count - 1) if 0.0 <= share <= 1.0 else 0
+
+
+@compiled
 def _paint(
     x: float,
     y: float,
@@ -295,8 +302,8 @@ def _paint(
             pixel[channel] = min(shade * color[channel], 255.0)
         return
     u, v = _at(planes[4], x, y) / inverse, _at(planes[5], x, y) / inverse
-    column = min(int((u - np.floor(u)) * width), width - 1)
-    row = height - 1 - min(int((v - np.floor(v)) * height), height - 1)
+    column = _texel(u, width)
+    row = height - 1 - _texel(v, height)
     for channel in range(3):
         share = texture[row, column, channel] / 255.0
         pixel[channel] = min(shade * color[channel] * share, 255.0)

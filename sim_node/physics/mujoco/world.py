@@ -13,7 +13,7 @@ import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character
-from msgs_config.errors import ClosedError
+from msgs_config.errors import ClosedError, SimulationError
 from msgs_config.geometry import fixed_order
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.engine import UNLIMITED_SPEED
@@ -25,9 +25,10 @@ from sim_node.physics.mujoco.part import NOTHING, Part
 from sim_node.physics.settings import WorldSettings
 
 _DOWN = np.array((0.0, 0.0, -1.0))
+_FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
 
-# MuJoCo writes its warnings into a file where the process runs. What they are of, the simulation
-# finds in the states, and says.
+# MuJoCo would write its warnings into a file where the process runs. Of what is full, `step` says
+# it; the others are of states that are not finite, which the simulation finds.
 mujoco.set_mju_user_warning(lambda message: None)
 
 
@@ -131,11 +132,17 @@ class MujocoWorld:
         self.model.opt.gravity[:] = gravity * _DOWN
 
     def step(self) -> None:
-        """Advance by one engine step; efforts last one step and are to be applied again."""
+        """Advance by one engine step; efforts last one step and are to be applied again.
+
+        Raises:
+            SimulationError: there are too many contacts, which would all have no force.
+        """
         model, data = self.model, self.data
         # The parts of `mj_step`, without its look for numbers out of bounds, of which it writes a
         # file: the simulation looks itself.
         mujoco.mj_fwdPosition(model, data)
+        if any(data.warning[each].number for each in _FULL):
+            raise SimulationError("more touches at once than the engine 'mujoco' has room for")
         soften_friction(data)
         mujoco.mj_fwdVelocity(model, data)
         self._apply_pushes(model, data)
