@@ -82,6 +82,8 @@ def make_view(
 @compiled
 def _convert(view: Any, position: FloatArray, out: FloatArray) -> None:
     """Write a position (n,), message form, as MuJoCo has it (q,)."""
+    if len(position) != len(view.velocity):  # MuJoCo would read what is beyond its end
+        raise ValueError("an array has not one entry a degree of freedom")
     moved = position.copy()
     out[:] = view.identity
     mj.move_position(view.model, out.ctypes.data, moved.ctypes.data, 1.0)

@@ -123,3 +123,15 @@ def test_arrays_of_other_numbers_are_refused_and_nothing_more_is_compiled() -> N
     model = DynamicsModel(character("pendulum"))
     with pytest.raises(TypeError, match="No matching definition"):
         model.update(np.zeros(1, dtype=np.float32), np.zeros(1))
+
+
+@pytest.mark.parametrize("length", [0, 3, 50])
+def test_a_position_of_another_length_is_refused(length: int) -> None:
+    whole = character("humanoid")
+    model, size = DynamicsModel(whole), whole.layout.size
+    right, wrong = np.zeros(size), np.zeros(length)
+
+    with pytest.raises(ValueError, match="one entry a degree of freedom"):
+        model.update(wrong, right)
+    with pytest.raises(ValueError, match="one entry a degree of freedom"):
+        model.stable_pd(right, right, wrong, right, right, right, PERIOD)
