@@ -1,6 +1,7 @@
 """Plain loops in MuJoCo that hold the same humanoid to the same clip: what a tick must cost."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -52,18 +53,12 @@ class MujocoLoop:
 class ServoLoop(MujocoLoop):
     """The same with MuJoCo's own springs and dampers in the joints, in C; the root is held."""
 
-    def __init__(
-        self,
-        character: Character,
-        reference: Sequence[ReferenceState],
-        stiffness: FloatArray,
-        damping: FloatArray,
-    ) -> None:
-        super().__init__(character, reference, stiffness, damping)
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
         model = self.model
         first = model.jnt_dofadr
-        model.jnt_stiffness[:] = stiffness[first]
-        model.dof_damping[:] = damping
+        model.jnt_stiffness[:] = self._stiffness[first]
+        model.dof_damping[:] = self._damping
         model.opt.disableflags &= ~int(
             mujoco.mjtDisableBit.mjDSBL_SPRING | mujoco.mjtDisableBit.mjDSBL_DAMPER
         )
