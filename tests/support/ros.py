@@ -34,7 +34,7 @@ from actuated_characters.runs.processes import MODULES, Child
 from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
-from msgs_config.messages.topic import Topic
+from msgs_config.messages.topic import LISTENING_DEPTH, Topic
 from tests.support.forked import Fork
 
 PATIENCE = 30.0
@@ -279,6 +279,7 @@ class Client:
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
         self._clients: dict[str, ServiceClient] = {}
+        self._take_waiting: list[Callable[[], None]] = []
 
     def close(self) -> None:
         """Leave the graph."""
@@ -294,9 +295,19 @@ class Client:
             inbox.sent_ns.append(info["source_timestamp"])
             inbox.messages.append(deserialize_message(raw, topic.message_type))
 
-        self.node.create_subscription(
-            topic.message_type, topic.name, keep, qos or topic.qos, raw=True
+        subscription = self.node.create_subscription(
+            topic.message_type, topic.name, keep, qos or topic.for_listener().qos, raw=True
         )
+
+        def take_waiting() -> None:
+            # At most as many as the reader holds: a publisher may be quicker than this loop.
+            for _ in range(LISTENING_DEPTH):
+                taken = subscription.handle.take_message(topic.message_type, True)
+                if taken is None:
+                    return
+                keep(*taken)
+
+        self._take_waiting.append(take_waiting)
         return inbox
 
     def speak(self, topic: Topic, qos: QoSProfile | None = None) -> Publisher:
@@ -307,7 +318,17 @@ class Client:
         self, condition: Callable[[], Any], what: str, patience: float = PATIENCE
     ) -> Any:
         """Receive messages until the condition gives something true, which is returned."""
-        return wait_until(condition, what, patience, lambda: self._executor.spin_once(0.02))
+        return wait_until(condition, what, patience, self._spin_once)
+
+    def _spin_once(self) -> None:
+        """Wait for something to do, and take all messages that have come.
+
+        The executor takes one at a turn, which is slower than a simulation that runs free: its
+        messages would pile up until the middleware drops the oldest.
+        """
+        self._executor.spin_once(0.02)
+        for take_waiting in self._take_waiting:
+            take_waiting()
 
     def spin_sending(
         self, send: Callable[[], None], condition: Callable[[], Any], what: str
@@ -320,7 +341,7 @@ class Client:
             if time.monotonic() >= next_time:
                 send()
                 next_time = time.monotonic() + RETRY_PERIOD
-            self._executor.spin_once(0.02)
+            self._spin_once()
 
         return wait_until(condition, what, step=step)
 
@@ -466,7 +487,7 @@ class SimulatorClient(Client):
         def step() -> None:
             nonlocal answering
             if answering is None:
-                self._executor.spin_once(0.02)
+                self._spin_once()
             else:
                 answering = self.advance(answering, {})
 
