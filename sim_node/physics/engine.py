@@ -69,6 +69,8 @@ class Body(Protocol):
         It is the force in N, and the torque in N m about the link's centre of mass when the step
         began. A contact between two links of the body counts on both, in opposite directions. To be
         asked for before `link_frames` and `centres`: those move the links to where they are now.
+        Nothing touches before the first step, nor from `World.from_bytes` to the next step: a state
+        does not say what led to it.
         """
 
     def gaps(self, ball: int) -> FloatArray:
@@ -154,6 +156,7 @@ class World(Protocol):
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`.
 
         To be called right after a step: an effort that was applied but not stepped yet may stay.
+        Contacts are none until the next step.
         """
 
 
