@@ -25,7 +25,7 @@ setup(
     description="Physically simulated characters, actuated by torques over ROS 2 topics.",
     maintainer="actuated_characters developers",
     license="Apache-2.0",
-    python_requires=">=3.11,<3.13",
+    python_requires=">=3.11,<3.14",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
         "": ["py.typed"],
