@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support import golden
+from tests.support.engines import need_engine
 
 pytestmark = [
     pytest.mark.slow,
@@ -52,6 +53,7 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 @pytest.mark.parametrize("engine", golden.WORLDS)
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_path: Path) -> None:
+    need_engine(engine)
     arguments = golden.arguments_of(name, engine)
 
     summary = golden.summary_apart(arguments, tmp_path / "run", before=POISON)
@@ -76,6 +78,7 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_
 def test_the_processors_kernels_do_not_matter(
     environment: dict[str, str], engine: str, tmp_path: Path
 ) -> None:
+    need_engine(engine)
     arguments = golden.arguments_of(SENSITIVE, engine)
 
     summary = golden.summary_apart(arguments, tmp_path / "run", environment=environment)

@@ -6,6 +6,7 @@ import pytest
 from rclpy.context import Context
 
 from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
+from tests.support.engines import need_engine
 from tests.support.ros import SimulatorClient
 
 Join = Callable[..., SimulatorClient]
@@ -28,5 +29,6 @@ def join(context: Context) -> Iterator[Join]:
 @pytest.fixture(params=ENGINES)
 def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Each engine in turn, which all worlds of the test are simulated by unless it says which."""
+    need_engine(request.param)
     monkeypatch.setitem(ENGINES, DEFAULT_ENGINE, ENGINES[request.param])
     return str(request.param)

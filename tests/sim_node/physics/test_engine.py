@@ -11,6 +11,7 @@ from sim_node.parameters import load_parameters
 from sim_node.physics import engine as seam
 from sim_node.physics.engine import ENGINES, describe_default_engine, make_world
 from sim_node.physics.settings import SimulationSettings, WorldSettings
+from tests.support.engines import need_engine
 from tests.support.physics import simulation
 
 MISSING = "a_package_that_nobody_has"
@@ -18,6 +19,7 @@ MISSING = "a_package_that_nobody_has"
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_world_is_of_the_engine_that_is_named(name: str) -> None:
+    need_engine(name)
     loaded = load_parameters({"character": "pendulum", "engine": name})
 
     settings = SimulationSettings.of(loaded.values).world
