@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from sim_node.physics.engine import INSTALLED_ENGINES
 from tests.support import golden
-from tests.support.engines import need_engine
 
 TABLE = golden.golden()
 QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
@@ -37,13 +37,11 @@ def test_the_engines_are_those_of_the_table() -> None:
     [
         pytest.param(name, engine, marks=marks_of(name))
         for name, run in TABLE["runs"].items()
-        for engine in golden.WORLDS
+        for engine in INSTALLED_ENGINES
         if engine in run
     ],
 )
 def test_a_golden_run_has_the_states_of_the_table(name: str, engine: str, tmp_path: Path) -> None:
-    need_engine(engine)
-
     summary = golden.summary_here(golden.arguments_of(name, engine), tmp_path / "run")
 
     assert_as_in_the_table(name, engine, summary)
@@ -54,11 +52,9 @@ def test_a_golden_run_has_the_states_of_the_table(name: str, engine: str, tmp_pa
     "name",
     [OVER_TOPICS[0], *(pytest.param(name, marks=pytest.mark.nightly) for name in OVER_TOPICS[1:])],
 )
-@pytest.mark.parametrize("engine", golden.WORLDS)
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 def test_over_topics_it_has_them_too(name: str, engine: str, domain: int, tmp_path: Path) -> None:
     del domain
-    need_engine(engine)
-
     summary = golden.summary_over_topics(golden.arguments_of(name, engine), tmp_path / "run")
 
     assert_as_in_the_table(name, engine, summary)

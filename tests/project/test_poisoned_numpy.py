@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim_node.physics.engine import INSTALLED_ENGINES
 from tests.support import golden
-from tests.support.engines import need_engine
 
 pytestmark = [
     pytest.mark.slow,
@@ -50,10 +50,9 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 """
 
 
-@pytest.mark.parametrize("engine", golden.WORLDS)
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_path: Path) -> None:
-    need_engine(engine)
     arguments = golden.arguments_of(name, engine)
 
     summary = golden.summary_apart(arguments, tmp_path / "run", before=POISON)
@@ -61,7 +60,7 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_
     assert summary["state_hash"] == TABLE[name][engine]["state_hash"]
 
 
-@pytest.mark.parametrize("engine", golden.WORLDS)
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 @pytest.mark.parametrize(
     "environment",
     [
@@ -78,7 +77,6 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_
 def test_the_processors_kernels_do_not_matter(
     environment: dict[str, str], engine: str, tmp_path: Path
 ) -> None:
-    need_engine(engine)
     arguments = golden.arguments_of(SENSITIVE, engine)
 
     summary = golden.summary_apart(arguments, tmp_path / "run", environment=environment)

@@ -25,12 +25,10 @@ from typing import Any
 from actuated_characters.commands.run import add_run, planned_run
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.in_process import run_in_process
-from sim_node.physics import engine as seam
+from sim_node.physics.engine import INSTALLED_ENGINES
 
 FILE = Path(__file__).parents[1] / "data" / "state_hashes.json"
 ENGINES = ("pybullet", "mujoco-core")
-WORLDS = tuple(seam.ENGINES)
-"""The engines of the world."""
 _KEPT = ("state_hash", "ticks", "joint_error_mean_rad", "root_error_mean_m", "fell")
 _THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -166,7 +164,7 @@ def renew(names: Sequence[str]) -> None:
         made = [
             (name, engine)
             for name in chosen
-            for engine in seam.INSTALLED_ENGINES
+            for engine in INSTALLED_ENGINES
             if engine in runs[name]
         ]
         summaries = workers.map(
