@@ -151,12 +151,9 @@ PIP := $(BIN)/python -m pip
 define install
 @$(PIP) install -qq -e '.[$(1)$(if $(filter 1,$(BULLET)),$(COMMA)bullet)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 $(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
-@$(BIN)/python -c '$(HAS_DATA)' || { echo "fetching the package pybullet_data (140 MB) ..." && $(FETCH) && $(BIN)/python -c '$(UNPACK)' && rm -r build/pybullet; } || { echo "$(PIP_FAILED)" >&2; exit 1; }
+@$(BIN)/python -m msgs_config.fetch_robots || { echo "$(PIP_FAILED)" >&2; exit 1; }
 @$(BIN)/python -c '$(COMPILE)'
 @echo '$(BULLET)' > .venv/.bullet
 endef
-HAS_DATA := import importlib.util, sys; sys.exit(importlib.util.find_spec("pybullet_data") is None)
-FETCH := $(PIP) download -qq --no-deps --only-binary :all: --implementation cp --python-version 3.11 --platform manylinux2014_x86_64 --dest build/pybullet pybullet==3.2.7
-UNPACK := import glob, sysconfig, zipfile; z = zipfile.ZipFile(glob.glob("build/pybullet/pybullet-*.whl")[0]); z.extractall(sysconfig.get_path("purelib"), [n for n in z.namelist() if n.startswith("pybullet_data/")])
 COMPILE := import actuated_characters.render.engine.render_scene, sim_node.physics.mujoco.world, sim_node.physics.soft_limits
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.
