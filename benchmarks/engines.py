@@ -15,7 +15,7 @@ from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from controller_node.parameters import make_controller
 from msgs_config.character.model import Character
-from sim_node.physics.engine import ENGINES
+from sim_node.physics.engine import INSTALLED_ENGINES
 
 _BLOCK, _BLOCKS, _WARM_UP = 32, 60, 3  # ticks; blocks of each, in turn
 _TICKS = _BLOCK * _BLOCKS + 1
@@ -41,7 +41,7 @@ def measure_engines(console: Console) -> list[Ratio]:
 
 def _ours(character: Character) -> dict[str, Callable[[], object]]:
     loops: dict[str, Callable[[], object]] = {}
-    for engine in ENGINES:
+    for engine in INSTALLED_ENGINES:
         controller = ac.Controller(character, clip="walk")
         simulation = ac.Simulation(character, start=controller.start, engine=engine)
         loops[engine] = partial(_tick, controller, simulation)

@@ -186,8 +186,9 @@ ENGINES = {
 }
 """By name, the preferred one first."""
 
-DEFAULT_ENGINE = next(name for name, engine in ENGINES.items() if find_spec(engine.package))
-"""The first engine that is installed."""
+INSTALLED_ENGINES = tuple(name for name, engine in ENGINES.items() if find_spec(engine.package))
+
+DEFAULT_ENGINE = INSTALLED_ENGINES[0]
 
 
 def describe_default_engine(engine: str) -> tuple[str, ...]:
