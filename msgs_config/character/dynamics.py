@@ -57,7 +57,6 @@ class DynamicsModel:
             self._identity,
             self._desired,
             self._damping,
-            self._is_damped,
         )
         """What compiled code has of it; not to be kept longer than the model."""
 
