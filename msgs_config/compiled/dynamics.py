@@ -5,7 +5,7 @@ and make the sums of `controller_node.control_laws.stable_pd_effort` entry by en
 the bits of these, which the tests compare.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -18,6 +18,7 @@ from msgs_config.compiled.decorator import compiled
 from msgs_config.compiled.mass_matrix import MassMatrix
 
 _OWN = types.Array(types.float64, 1, "C")
+_ROWS = types.Array(types.float64, 2, "C")
 GIVEN = types.Array(types.float64, 1, "A", readonly=True)
 """Any array (n,): it is copied before MuJoCo reads it, as rows that lie apart cannot be."""
 _FIELDS = (
@@ -78,25 +79,53 @@ def make_view(
     )
 
 
+class DynamicsParts(NamedTuple):
+    """The same as a tuple, which has no owners where it is borrowed."""
+
+    model: int
+    data: int
+    position: FloatArray  # (q,)
+    velocity: FloatArray  # (n,)
+    mass: FloatArray  # (e,)
+    diagonal: IntArray  # (n,)
+    identity: FloatArray  # (q,)
+    desired: FloatArray  # (q,)
+    passive_damping: FloatArray  # (n,)
+
+
 @compiled
 def _convert(view: Any, position: FloatArray, out: FloatArray) -> None:
-    """Write a position (n,), message form, as MuJoCo has it (q,)."""
+    """Write a position (n,), message form, without gaps, as MuJoCo has it (q,)."""
     if len(position) != len(view.velocity):  # MuJoCo would read what is beyond its end
         raise ValueError("an array has not one entry a degree of freedom")
-    moved = position.copy()
     out[:] = view.identity
-    mj.move_position(view.model, out.ctypes.data, moved.ctypes.data, 1.0)
+    mj.move_position(view.model, out.ctypes.data, position.ctypes.data, 1.0)
 
 
-@compiled.of(types.void(VIEW, GIVEN, GIVEN))
-def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
-    """Take over a state: position (n,), message form, and velocity (n,)."""
+@compiled.of(_ROWS(VIEW, _ROWS))
+def convert_rows(view: Any, positions: FloatArray) -> FloatArray:
+    """Positions (k, n), message form, as MuJoCo has them (k, q)."""
+    rows = np.empty((len(positions), len(view.position)))
+    for k in range(len(positions)):
+        _convert(view, positions[k], rows[k])
+    return rows
+
+
+@compiled
+def enter_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
+    """Take over a state: position (n,), message form, and velocity (n,), without gaps."""
     _convert(view, position, view.position)
     view.velocity[:] = velocity
     mj.find_frames(view.model, view.data)
     mj.find_centres_of_mass(view.model, view.data)
     mj.find_mass_matrix(view.model, view.data)
     mj.find_velocities(view.model, view.data)
+
+
+@compiled.of(types.void(VIEW, GIVEN, GIVEN))
+def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
+    """Take over a state: position (n,), message form, and velocity (n,)."""
+    enter_state(view, position.copy(), velocity)
 
 
 @compiled
@@ -109,10 +138,15 @@ def add_effort(
     stiffness: FloatArray,
     damping: FloatArray,
     period: float,
+    bias: FloatArray,
+    acceleration: FloatArray,
 ) -> None:
-    """Add stable PD against errors (n,) to a feedforward or zero (n,), in the state taken over."""
+    """Add stable PD against errors (n,) to a feedforward or zero (n,), in the state taken over.
+
+    Bias and acceleration are room (n,).
+    """
     law.add_known(effort, error, velocity, desired_velocity, stiffness, damping, period)
-    bias, acceleration = np.empty(len(effort)), np.empty(len(effort))
+    bias[:] = 0.0
     mj.find_bias_force(view.model, view.data, 0, bias.ctypes.data)
     law.subtract_implicit(
         effort,
@@ -158,10 +192,22 @@ def stable_pd(
     effort, error = np.zeros(len(velocity)), np.empty(len(velocity))
     if len(feedforward):
         effort += feedforward
-    _convert(view, desired, view.desired)
+    _convert(view, desired.copy(), view.desired)
     start, end = view.position.ctypes.data, view.desired.ctypes.data
     mj.find_difference(view.model, error.ctypes.data, 1.0, start, end)
     if len(offset):
         error += offset
-    add_effort(effort, view, error, velocity, desired_velocity, stiffness, damping, period)
+    bias, acceleration = np.empty(len(velocity)), np.empty(len(velocity))
+    add_effort(
+        effort,
+        view,
+        error,
+        velocity,
+        desired_velocity,
+        stiffness,
+        damping,
+        period,
+        bias,
+        acceleration,
+    )
     return effort

@@ -10,6 +10,7 @@ from controller_node.planner.compiled.features import Watched, write_features
 from controller_node.planner.compiled.law import Joints, Room, add_errors, stable_pd
 from controller_node.references.offsets import knot_before
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled.borrowed import borrow
 from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.mujoco_functions import step_after_forces, step_before_forces
@@ -85,6 +86,8 @@ def roll_out(
         body: The character.
         engine: What simulates it.
     """
+    desired, body, engine = borrow(desired), borrow(body), borrow(engine)
+    features, knots = borrow(features), borrow(knots)
     n = len(start_velocity)
     room = Room(np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
     bounds = _room_for_bounds(_MOST_BOUNDS, n)
