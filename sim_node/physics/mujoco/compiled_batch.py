@@ -113,7 +113,7 @@ def advance(
                 worlds.history[world, tick] = worker.motion
 
 
-@compiled
+@compiled.inlined
 def _find_effort(
     world: int, worlds: Worlds, commands: Commands, model: BatchModel, worker: Worker
 ) -> None:
@@ -138,7 +138,7 @@ def _find_effort(
     clip(effort, model.effort_limits, law.vector_starts, law.vector_lengths)
 
 
-@compiled
+@compiled.inlined
 def _answer(
     world: int,
     worlds: Worlds,
@@ -174,7 +174,7 @@ def _answer(
     )
 
 
-@compiled
+@compiled.inlined
 def _advance_tick(
     world: int, worlds: Worlds, commands: Commands, model: BatchModel, worker: Worker
 ) -> bool:
@@ -194,7 +194,7 @@ def _advance_tick(
     return _is_sound(model, worker)
 
 
-@compiled
+@compiled.inlined
 def _apply(knows_state: bool, model: BatchModel, worker: Worker) -> None:
     """Apply the effort and the soft limits for a step from the state in the worker's room.
 
@@ -214,7 +214,7 @@ def _apply(knows_state: bool, model: BatchModel, worker: Worker) -> None:
         worker.step.applied[i] = worker.effort[i] + (worker.passive[i] if passed else 0.0)
 
 
-@compiled
+@compiled.inlined
 def _is_sound(model: BatchModel, worker: Worker) -> bool:
     """Whether a state is finite, and no faster than the limit."""
     sound = True

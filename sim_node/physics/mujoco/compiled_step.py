@@ -79,7 +79,7 @@ def step_buffers(
     )
 
 
-@compiled
+@compiled.inlined
 def step(world: int, tick: int, pushes: Pushes, buffers: StepBuffers) -> bool:
     """Advance by one engine step, with the efforts in `applied`; whether all contacts had room.
 
@@ -103,7 +103,7 @@ def step(world: int, tick: int, pushes: Pushes, buffers: StepBuffers) -> bool:
     return True
 
 
-@compiled
+@compiled.inlined
 def _has_room(buffers: StepBuffers) -> bool:
     """Whether there was room for all contacts; where there was not, the next step may have it."""
     has_room = True
@@ -113,7 +113,7 @@ def _has_room(buffers: StepBuffers) -> bool:
     return has_room
 
 
-@compiled
+@compiled.inlined
 def _soften_friction(buffers: StepBuffers) -> None:
     """See `soften_friction`."""
     raw, fields = buffers.raw, buffers.fields
@@ -127,7 +127,7 @@ def _soften_friction(buffers: StepBuffers) -> None:
             raw.arena[start + 4 * row + 1] *= SLOWING
 
 
-@compiled
+@compiled.inlined
 def _apply(push: int, pushes: Pushes, buffers: StepBuffers) -> None:
     body, point = pushes.bodies[push], pushes.points[push]
     axes = buffers.axes[body]
@@ -142,7 +142,7 @@ def _apply(push: int, pushes: Pushes, buffers: StepBuffers) -> None:
     mj.apply_wrench(buffers.model, buffers.data, force, torque, at, body, out)
 
 
-@compiled
+@compiled.inlined
 def _bound_speeds(buffers: StepBuffers) -> None:
     """Have the step gone with the speeds that are let be."""
     bound, is_faster = buffers.speed_bound, False
@@ -157,7 +157,7 @@ def _bound_speeds(buffers: StepBuffers) -> None:
         mj.move_position(buffers.model, start, velocity, buffers.period)
 
 
-@compiled
+@compiled.inlined
 def add_contacts(share: float, wrenches: FloatArray, buffers: StepBuffers) -> None:
     """Add a share of the net contact wrenches (links, 6) of the last step: see `sum_contacts`."""
     raw, fields = buffers.raw, buffers.fields
