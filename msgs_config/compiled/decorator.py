@@ -31,6 +31,7 @@ from numba.core import event  # noqa: E402
 from msgs_config.geometry import scalars  # noqa: E402
 
 _CONFIG: Any = numba.config
+_NJIT: Any = numba.njit  # its annotations differ from version to version
 _CONFIG.reload_config()  # where somebody has imported numba before
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
@@ -70,7 +71,7 @@ class Compiler:
     def _compile(self, function: _Function, signature: Any, **options: bool) -> _Function:
         given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(self.cache)  # read as numba decorates
         try:
-            make: Any = numba.njit(
+            make = _NJIT(
                 signature,
                 nogil=True,
                 cache=self._is_kept,
@@ -83,7 +84,7 @@ class Compiler:
             _CONFIG.CACHE_DIR = given
 
 
-class _Announcer(event.Listener):  # type: ignore[misc]  # numba has no annotations
+class _Announcer(event.Listener):  # type: ignore[misc,unused-ignore]  # annotated in some versions
     """Says, once, what takes so long when a function of ours is compiled."""
 
     def __init__(self) -> None:
