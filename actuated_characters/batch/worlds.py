@@ -247,7 +247,7 @@ class Batch:
         numbers = world_numbers(worlds, len(self))
         ticks = reference_ticks(at, len(numbers))
         known = {row: self._sample(row) for row in set(ticks)}
-        begin = np.array([known[row] for row in ticks]).reshape(len(ticks), 2, -1)
+        begin = np.array([known[row] for row in ticks]).reshape(-1, 2, self.character.layout.size)
         for place, (what, given) in enumerate((("position", position), ("velocity", velocity))):
             if given is not None:
                 begin[:, place] = finite_array(what, given, begin[:, place].shape)
