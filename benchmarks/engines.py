@@ -61,12 +61,8 @@ def _tick(controller: ac.Controller, simulation: ac.Simulation, ticks: int) -> N
 def _batch_loop(character: Character) -> Callable[[int], object]:
     """So many ticks of a humanoid, in calls of eight, as a policy would make them."""
     batch = ac.Batch(character, _WORLDS, threads=1, clip="walk")
-
-    def step(ticks: int) -> None:
-        for _ in range(ticks // 8):
-            batch.step(ticks=8)
-
-    return step
+    eight = partial(batch.step, ticks=8)
+    return lambda ticks: _repeat(eight, ticks // 8)
 
 
 def _repeat(step: Callable[[], object], ticks: int) -> None:

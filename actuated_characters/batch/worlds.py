@@ -87,12 +87,15 @@ class Batch:
         self.character = setup.character.character
         self.start = given.motion.first_state()
         """The state in which the reference begins."""
+        self.settings = setup.settings
+        """What the worlds depend on besides the character."""
         self._clock = TickClock(setup.settings.rate_hz)
         self._motion = TrackedReference(
             self.character, given.motion.reference, self._clock, self._clock.stamp_ns(FIRST_TICK)
         )
-        self._motion.follows_velocity = given.follows_velocity
+        self._follows_velocity = given.follows_velocity
         self._rows = range(0)  # ticks of the reference that the worlds have
+        self._samples = np.zeros((0, 2, self.character.layout.size))  # of these ticks
         layout = self.character.layout
         self._actuated = layout.mask(layout.actuated_joint_names)
         self._kind, self._push_ticks = setup.action, given.push_ticks
@@ -122,6 +125,11 @@ class Batch:
 
     def __len__(self) -> int:
         return len(self._first_ticks)
+
+    @property
+    def motion(self) -> FloatArray:
+        """Positions and velocities (count, 2, n) now; the array that each step writes to."""
+        return self._states.motion
 
     @property
     def position(self) -> FloatArray:
@@ -179,9 +187,9 @@ class Batch:
 
     def desired(self, ahead: int = 0) -> FloatArray:
         """Positions and velocities (count, 2, n) of the reference, some ticks from now."""
-        rows = (self._states.rows + ahead).tolist()
-        known = {row: self._sample(row) for row in set(rows)}
-        return np.array([known[row] for row in rows])
+        ahead = whole_number("ahead", ahead, 0, _MOST_TICKS)
+        self._sample_ahead(ahead, np.ones(len(self), dtype=np.bool_))
+        return self._samples[self._states.rows + ahead - self._rows.start]
 
     def push(
         self,
@@ -238,8 +246,8 @@ class Batch:
         self._check_open()
         numbers = world_numbers(worlds, len(self))
         ticks = reference_ticks(at, len(numbers))
-        known = {row: self._first(row) for row in set(ticks)}
-        begin = np.array([known[row] for row in ticks]).reshape(len(ticks), 2, -1)
+        known = {row: self._sample(row) for row in set(ticks)}
+        begin = np.array([known[row] for row in ticks]).reshape(-1, 2, self.character.layout.size)
         for place, (what, given) in enumerate((("position", position), ("velocity", velocity))):
             if given is not None:
                 begin[:, place] = finite_array(what, given, begin[:, place].shape)
@@ -273,7 +281,7 @@ class Batch:
     def _advance(self, ticks: int, actions: FloatArray | None) -> None:
         """Advance by a few ticks, with actions (count, n), and hash the states."""
         if self._kind is not ActionKind.EFFORT:
-            self._sample_ahead(ticks)
+            self._sample_ahead(ticks, ~self._states.failed)
         states, before, acting = self._states, self._states.ticks.copy(), ~self._states.failed
         kept = ticks if self._hashes else 0
         history = np.empty((len(self), kept, 2, self.character.layout.size))
@@ -292,24 +300,20 @@ class Batch:
         if self._is_closed:
             raise ClosedError("the batch is closed; make a new one")
 
-    def _first(self, row: int) -> tuple[FloatArray, FloatArray]:
-        """The state in which the reference is at a tick."""
+    def _sample(self, row: int) -> tuple[FloatArray, FloatArray]:
+        """The state of the reference at a tick."""
         _, state = self._motion.own(row)[0]
         return state.configuration.position, state.velocity
 
-    def _sample(self, row: int) -> tuple[FloatArray, FloatArray]:
-        """The state that is tracked at a tick of the reference."""
-        state = self._motion.desired(*self._motion.own(row)[0])
-        return state.configuration.position, state.velocity
-
-    def _sample_ahead(self, ticks: int) -> None:
-        """Have the reference's rows for all worlds that go on, over so many ticks."""
-        rows = self._states.rows[~self._states.failed]
+    def _sample_ahead(self, ticks: int, worlds: BoolArray) -> None:
+        """Have the reference's rows for some worlds (count,), over so many ticks."""
+        rows = self._states.rows[worlds]
         if not len(rows):
             return
         first, last = int(rows.min()), int(rows.max()) + ticks
         if first in self._rows and last in self._rows:
             return
         self._rows = range(first, last + _ROWS_AHEAD)
-        samples = np.array([self._sample(row) for row in self._rows])
-        self._batch.set_reference(first, samples[:, 0], samples[:, 1])
+        self._samples = np.array([self._sample(row) for row in self._rows])
+        velocities = self._samples[:, 1] * self._follows_velocity
+        self._batch.set_reference(first, self._samples[:, 0], velocities)

@@ -19,7 +19,7 @@ RENDER_MODES = ["rgb_array"]
 
 _RESET_OPTIONS = ["start"]
 # Parameters of the controller that would act beside an action, and the one value that does not.
-_UNAIDED_PARAMETERS = {"planner": "none", "behaviour": "tracking", "root_assistance": False}
+UNAIDED_PARAMETERS = {"planner": "none", "behaviour": "tracking", "root_assistance": False}
 
 
 def controller_values(character: Character, given: Mapping[str, object]) -> Values:
@@ -28,13 +28,13 @@ def controller_values(character: Character, given: Mapping[str, object]) -> Valu
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or one would act beside the action.
     """
-    for name, alone in _UNAIDED_PARAMETERS.items():
+    for name, alone in UNAIDED_PARAMETERS.items():
         if given.get(name, alone) != alone:
             raise ConfigurationError(
                 f"parameter '{name}' is {given[name]}; in an environment it must be {alone}, "
                 "because the action takes its place"
             )
-    given = {**choose_reference(given), **given, **_UNAIDED_PARAMETERS}
+    given = {**choose_reference(given), **given, **UNAIDED_PARAMETERS}
     return parameters.resolve_for(character, given)
 
 

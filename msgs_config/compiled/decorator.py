@@ -59,7 +59,7 @@ class Compiler:
 
     def inlined(self, function: _Function) -> _Function:
         """Compile a function into those that call it: large tuples are not handed over then."""
-        return self._compile(function, None, forceinline=True)
+        return self._compile(function, None, is_inlined=True)
 
     def of(self, signature: object) -> Callable[[_Function], _Function]:
         """Compile a function for these types alone, before it is called.
@@ -68,7 +68,7 @@ class Compiler:
         """
         return partial(self._compile, signature=signature)
 
-    def _compile(self, function: _Function, signature: Any, **options: bool) -> _Function:
+    def _compile(self, function: _Function, signature: Any, is_inlined: bool = False) -> _Function:
         given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(self.cache)  # read as numba decorates
         try:
             make = _NJIT(
@@ -77,7 +77,7 @@ class Compiler:
                 cache=self._is_kept,
                 error_model="numpy",
                 fastmath=False,
-                **options,
+                forceinline=is_inlined,
             )
             return cast(_Function, make(function))
         finally:

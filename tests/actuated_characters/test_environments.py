@@ -1,7 +1,6 @@
 """The Gymnasium environment: its library's own checker, our states, and when an episode ends."""
 
 import math
-import os
 import warnings
 from functools import lru_cache
 from pathlib import Path
@@ -293,7 +292,7 @@ def test_the_page_works() -> None:
     exec(one.removeprefix("python"), names)
     assert 0.0 <= names["reward"] <= 1.0
     exec(several.removeprefix("python"), names)
-    assert names["rewards"].shape == (os.cpu_count(),)
+    assert names["rewards"].shape == (32,)
 
 
 def test_what_diverges_ends_with_a_finite_observation() -> None:

@@ -1,5 +1,6 @@
 """Each world of a batch has the states of a simulation with its controller, to the bit."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -227,3 +228,13 @@ def test_what_does_not_fit_is_refused_and_changes_nothing() -> None:
     batch.close()
     with pytest.raises(ClosedError):
         batch.step()
+
+
+def test_the_lines_of_the_page_work() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "python.md").read_text("utf-8")
+    (code,) = [part for part in page.split("```") if "ac.Batch(" in part and "import" in part]
+    names: dict[str, Any] = {}
+
+    exec(code.removeprefix("python"), names)
+
+    assert names["batch"].ticks.max() == 240
