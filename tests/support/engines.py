@@ -13,6 +13,8 @@ from sim_node.physics.mujoco.world import MujocoWorld
 
 BULLET_IS_INSTALLED = "bullet" in INSTALLED_ENGINES
 NOT_INSTALLED = "it asks PyBullet itself, which is not installed"
+NO_BULLET = "pybullet is not installed, so the engine is mujoco"
+"""How a line ends that says which engine stands in for the preferred one."""
 needs_bullet = pytest.mark.skipif(not BULLET_IS_INSTALLED, reason=NOT_INSTALLED)
 """For what is about Bullet without asking it: its numbers, recordings of it."""
 
