@@ -27,10 +27,10 @@ from actuated_characters.environments.options import (
     checked_action,
     controller_values,
     start_of,
-    with_shared,
 )
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.runs.plan import with_shared
 from controller_node.model_check import check_inertia
 from controller_node.parameters import make_controller_settings
 from controller_node.references.factory import make_motion
@@ -119,7 +119,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         check_options(duration, ticks_per_step, simulator)
         if render_mode is not None:
             check_drawing(render_mode, render_size)
-        simulator, given = with_shared(simulator, controller, reference)
+        simulator, given = with_shared(simulator, {**controller, **reference})
         self._character = placed(load_character(character, collides(simulator)), simulator)
         values = controller_values(self._character, given)
         motion = make_motion(self._character, values)

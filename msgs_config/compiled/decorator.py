@@ -56,6 +56,10 @@ class Compiler:
         """Compile a function for the types that it is called with."""
         return self._compile(function, None)
 
+    def inlined(self, function: _Function) -> _Function:
+        """Compile a function into those that call it: large tuples are not handed over then."""
+        return self._compile(function, None, forceinline=True)
+
     def of(self, signature: object) -> Callable[[_Function], _Function]:
         """Compile a function for these types alone, before it is called.
 
@@ -63,11 +67,16 @@ class Compiler:
         """
         return partial(self._compile, signature=signature)
 
-    def _compile(self, function: _Function, signature: Any) -> _Function:
+    def _compile(self, function: _Function, signature: Any, **options: bool) -> _Function:
         given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(self.cache)  # read as numba decorates
         try:
             make: Any = numba.njit(
-                signature, nogil=True, cache=self._is_kept, error_model="numpy", fastmath=False
+                signature,
+                nogil=True,
+                cache=self._is_kept,
+                error_model="numpy",
+                fastmath=False,
+                **options,
             )
             return cast(_Function, make(function))
         finally:

@@ -331,7 +331,7 @@ def test_a_placed_reference_is_in_its_world() -> None:
         ({"behaviour": "ragdoll"}, "'behaviour' is ragdoll; .* must be tracking"),
         ({"planner": "predictive"}, "'planner' is predictive; .* must be none"),
         ({"root_assistance": True}, "'root_assistance' is True; .* must be False"),
-        ({"simulator": {"rate": 480}, "rate": 240}, "'rate' is 480 for the simulator and 240"),
+        ({"simulator": {"rate": 480}, "rate": 240}, "'rate' is 480 for sim_node and 240"),
         ({"controller": {"gains.hinge.q": 1.0}}, "gains.hinge.q"),
     ],
 )
