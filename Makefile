@@ -152,8 +152,8 @@ define install
 @$(PIP) install -qq -e '.[$(1)$(if $(filter 1,$(BULLET)),$(COMMA)bullet)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 $(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
 @$(BIN)/python -m msgs_config.fetch_robots || { echo "$(PIP_FAILED)" >&2; exit 1; }
-@$(BIN)/python -c '$(COMPILE)'
+@$(BIN)/python -m actuated_characters.compile_all
 @echo '$(BULLET)' > .venv/.bullet
 endef
-COMPILE := import actuated_characters.render.engine.render_scene, sim_node.physics.mujoco.world, sim_node.physics.soft_limits
+
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

@@ -201,12 +201,19 @@ class PollingExecutor:
         subscriptions = [each.handle for node in self._nodes for each in node.subscriptions]
         if not subscriptions:
             return self._turn(seconds)
-        context = self._executor.context.handle
-        waiting = rclpy_implementation.WaitSet(len(subscriptions), 0, 0, 0, 0, 0, context)
-        waiting.clear_entities()
-        for each in subscriptions:
-            waiting.add_subscription(each)
-        waiting.wait(round(seconds * _NS_PER_S))
+        context = self._executor.context
+        try:
+            waiting = rclpy_implementation.WaitSet(
+                len(subscriptions), 0, 0, 0, 0, 0, context.handle
+            )
+            waiting.clear_entities()
+            for each in subscriptions:
+                waiting.add_subscription(each)
+            waiting.wait(round(seconds * _NS_PER_S))
+        except rclpy_implementation.RCLError:
+            if context.ok():
+                raise
+            return False  # another thread has ended ROS, of which an executor says as little
         return bool(waiting.get_ready_entities("subscription"))
 
     def rest_for(self, seconds: float) -> None:

@@ -63,7 +63,10 @@ class DynamicsModel:
 
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
         """Take over a state: position (n,), message form, and velocity (n,)."""
-        compiled.take_state(self.view, position, velocity)
+        try:
+            compiled.take_state(self.view, position, velocity)
+        except TypeError:  # it takes doubles alone, and others would be asked for at each tick
+            compiled.take_state(self.view, *_doubles(position, velocity))
 
     @property
     def is_coupled(self) -> bool:
@@ -88,18 +91,16 @@ class DynamicsModel:
         of position and velocity (n,), those that are desired at the end of a period in s (n,), and
         gains (n,). An offset (n,) is added to the errors, a feedforward effort (n,) to the law's.
         """
-        effort: FloatArray = compiled.stable_pd(
-            self.view,
-            position,
-            velocity,
-            desired,
-            desired_velocity,
-            stiffness,
-            damping,
+        given = (
+            *(position, velocity, desired, desired_velocity, stiffness, damping),
             _NONE if offset is None else offset,
             _NONE if feedforward is None else feedforward,
-            period,
         )
+        effort: FloatArray
+        try:
+            effort = compiled.stable_pd(self.view, *given, period)
+        except TypeError:  # likewise
+            effort = compiled.stable_pd(self.view, *_doubles(*given), float(period))
         return effort
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
@@ -316,6 +317,10 @@ class DynamicsModel:
         jacobian = np.empty((6, self._layout.size))
         mujoco.mj_jac(self._model, self._data, jacobian[:3], jacobian[3:], point, link + 1)
         return jacobian
+
+
+def _doubles(*arrays: FloatArray) -> list[FloatArray]:
+    return [np.asarray(array, dtype=np.float64) for array in arrays]
 
 
 def still_model(character: Character, position: FloatArray) -> DynamicsModel:

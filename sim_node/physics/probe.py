@@ -46,6 +46,9 @@ def measure_probe(
         CharacterError: some degree of freedom cannot move, or moves neither mass nor inertia.
     """
     layout = character.layout
+    if layout.has_floating_base and not character.links[0].mass:
+        reason = "the base link has no mass, so that it cannot float; 'fixed_base: true' holds it"
+        raise CharacterError(f"{character.file}: {reason}")
     rng = np.random.default_rng(_SEED)
     position = _position(character, rng)
     velocity = rng.uniform(-_SPEED, _SPEED, layout.size)
@@ -117,14 +120,11 @@ def _check_inverse_mass(character: Character, inverse_mass_diagonal: FloatArray)
     if sound.all():
         return
     worst = int(np.argmin(sound))
-    base_mass = character.links[0].mass
-    if character.layout.has_floating_base and worst < _ROOT_ENTRIES and base_mass:
+    if character.layout.has_floating_base and worst < _ROOT_ENTRIES:
         reason = (
-            f"the base link has {base_mass:g} kg but no inertia; 'inertia: shapes' in a .yaml "
-            "file takes that of its shapes"
+            f"the base link has {character.links[0].mass:g} kg but no inertia; 'inertia: shapes' "
+            "in a .yaml file takes that of its shapes"
         )
-    elif character.layout.has_floating_base and worst < _ROOT_ENTRIES:
-        reason = "the base link has no mass, so the engine holds it; 'fixed_base: true' says so too"
     else:
         reason = f"nothing with mass or inertia moves at '{character.layout.dof_names[worst]}'"
     raise CharacterError(f"{character.file}: {reason}")

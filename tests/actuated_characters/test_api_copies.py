@@ -4,6 +4,7 @@ import copy
 import pickle
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -18,6 +19,7 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.file import shipped_characters
 from msgs_config.errors import SimulationError
 from sim_node.simulation_factory import make_simulation_settings
+from tests.support.engines import Engine
 from tests.support.physics import character, random_state
 from tests.support.pictures import take_picture
 
@@ -172,9 +174,13 @@ def test_a_world_says_that_it_cannot_be_copied(duplicate: Callable[[object], obj
     with ac.Simulation(character("pendulum")) as simulation:
         with pytest.raises(SimulationError, match="neither copied nor pickled; its snapshot"):
             duplicate(simulation)
-        with pytest.raises(SimulationError, match="neither copied nor pickled"):
-            duplicate(simulation._simulation._world._client)
         simulation.step([0.0])
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_bullet_says_that_it_cannot_be_copied(duplicate: Callable[[object], object]) -> None:
+    with closing(Engine()) as engine, pytest.raises(SimulationError, match="neither copied nor"):
+        duplicate(engine)
 
 
 @COPY

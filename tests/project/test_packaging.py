@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from sim_node.physics.engine import DEFAULT_ENGINE
 from tests.support.ros import Processes
 
 PROJECT = Path(__file__).parents[2]
@@ -38,7 +39,11 @@ def environment(prefix: Path, domain: int) -> dict[str, str]:
     del domain
     (site_packages,) = prefix.glob("lib/python3*/site-packages")
     given = {**os.environ, "AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": str(site_packages)}
-    command = [sys.executable, "-c", "import sim_node.physics.soft_limits"]
+    command = [
+        sys.executable,
+        "-c",
+        f"import sim_node.node, sim_node.physics.{DEFAULT_ENGINE}.world",
+    ]
     said = [
         subprocess.run(
             command, cwd=prefix, env=given, check=True, capture_output=True, text=True

@@ -33,7 +33,7 @@ def section(title: str, parameters: Sequence[Parameter]) -> str:
 
 
 def default(parameter: Parameter) -> str:
-    value = parameter.default
+    value = parameter.choices[0] if parameter.name == "engine" else parameter.default
     depends = parameter.name.startswith(("gains.", "effort_limit.", "initial_p", "initial_v"))
     if depends or parameter.name == "commanded_joints":
         return f"the character's, {parameter.unit}".rstrip(", ")

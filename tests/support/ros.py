@@ -35,6 +35,7 @@ from msgs_config.character.layout import ROOT
 from msgs_config.messages import topics
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.topic import LISTENING_DEPTH, Topic
+from tests.support.engines import STANDS_IN
 from tests.support.forked import Fork
 
 PATIENCE = 30.0
@@ -113,6 +114,12 @@ class Process(Child):
             return super()._start(arguments, environment, cwd)
         folder = cwd or Path.cwd()
         return Fork(self._module, arguments, self._output_file, self._log, folder, environment)
+
+    @property
+    def stderr(self) -> str:
+        """Its log so far, without the line that says which engine stands in for a missing one."""
+        lines = super().stderr.splitlines(keepends=True)
+        return "".join(line for line in lines if not line.rstrip().endswith(STANDS_IN))
 
     @property
     def peak_memory(self) -> float:

@@ -55,6 +55,7 @@ class MujocoBalls:
 
     def add(self, throw: ProjectileThrow) -> None:
         """Let a ball go: put it into the world with the position and velocity of the throw."""
+        self._world.check_open()
         self.balls.append(Ball(len(self.balls), throw))
         self._world.is_outdated = True
 

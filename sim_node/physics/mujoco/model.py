@@ -91,14 +91,14 @@ def _compile(
     links = [link for character in characters for link in character.links] + ball_links
     try:
         model = compile_exactly(spec, links)
-    except ValueError as error:
+        # The masses that contacts are scaled by are the links', not those of the bodies compiled.
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+    except (ValueError, mujoco.FatalError) as error:
         files = [str(each.file) for each in characters]
         if settings.terrain is not None:
             files.append(str(settings.terrain.urdf_path))
         reason = str(error).strip().replace("\n", "; ")
         raise CharacterError(f"{', '.join(files)}: not usable by MuJoCo: {reason}") from error
-    # The masses that contacts are scaled by are those of the links, not of the bodies compiled.
-    mujoco.mj_setConst(model, mujoco.MjData(model))
     model.dof_simplenum[:] = 0
     return model
 

@@ -64,7 +64,7 @@ class MujocoWorld:
         No degree of freedom is let be faster than `speed_bound`, rad/s or m/s. Whether MuJoCo takes
         it shows when the world is used.
         """
-        self._check_open()
+        self.check_open()
         body = MujocoBody(self, character, speed_bound)
         self._bodies.append(body)
         self.is_outdated = True
@@ -87,13 +87,14 @@ class MujocoWorld:
         self._update()
         return self._data
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Raise ClosedError if it is closed."""
         if self._is_closed:
             raise ClosedError("it is closed: its engine has ended; make a new one")
 
     def _update(self) -> None:
         """Compile the model again if something was added; what was there keeps its state."""
-        self._check_open()
+        self.check_open()
         if self.is_outdated:
             data = self._data
             states = [(part, part.state(data)) for part in self._parts() if part.is_placed]

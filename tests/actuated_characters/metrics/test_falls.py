@@ -225,7 +225,7 @@ def test_a_machine_that_is_thrown_down_fell_and_its_root_has_no_error(tmp_path: 
         4.0,
         controller={"behaviour": "state_machine", "machine": "walk", "reference": "steered"},
         simulator={"wrench_duration": 0.2},
-        pushes=[plan_push(1.0, RATE, "chest", (900.0, 0.0, 0.0))],
+        pushes=[plan_push(1.0, RATE, "chest", (500.0, 0.0, 0.0))],
     )
 
     run = InProcessRunner(tmp_path).run(spec)

@@ -35,8 +35,9 @@ from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from sim_node.physics.balls.sphere_sweep import find_impact
+from sim_node.physics.engine import DEFAULT_ENGINE
 from sim_node.physics.simulation import Simulation
-from tests.support.engines import pybullet
+from tests.support.engines import links_at_ball
 from tests.support.physics import character
 from tests.support.runs import run_plan
 from tests.support.thrown_states import watch_states
@@ -55,19 +56,18 @@ def plan_of(
     return make_plan("humanoid", seconds, reference or HELD, simulator, {})
 
 
-def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...], FloatArray]:
+def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, frozenset[str], FloatArray]:
     """Run a plan until a ball first touches the character, by the engine's own list.
 
     Returns the tick of the state after that step, the links that it touches, and its motion (13,)
     in the state before. The command finds the same.
     """
     states: States = []
-    found: list[tuple[int, tuple[str, ...]]] = []
+    found: list[tuple[int, frozenset[str]]] = []
 
     def watch(run: Simulation) -> None:
         watch_states(states, run)
-        balls = run._world.balls.numbers
-        if balls and (links := _touching(run, balls[0])):
+        if run._world.balls.throws and (links := links_at_ball(run, 0)):
             found.append((run.tick, links))
 
     for _ in ticks_in_process(plan, (), [planned], watch=watch):
@@ -77,13 +77,6 @@ def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...
     time, link = find_hit(plan, [planned], 0, states) or (0.0, "")
     assert (round(time * RATE), link in links) == (tick - 1, True)
     return tick, links, states[-2][1][0]
-
-
-def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
-    """The links of the character that a ball pushes, by the engine's own list."""
-    body = run.characters[0]._body
-    points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
-    return tuple(LINKS[body._row[point[4]]] for point in points)
 
 
 # Aiming
@@ -101,7 +94,7 @@ def test_a_ball_hits_its_target_at_its_time_from_its_side(
     planned, before = plan_throw(plan, ThrowRequest(1.0, speed, 0.8, "neck", side, radius=0.06))
     tick, links, motion = first_hit(plan, planned)
 
-    assert before == () and links == ("neck",)
+    assert before == () and links == {"neck"}
     assert abs((tick - 1) - 0.8 * RATE) <= 2.0
     came = -motion[7:10] / np.linalg.norm(motion[7:10])
     angle = {"front": 0.0, "left": 90.0, "back": 180.0, "right": 270.0}.get(side)
@@ -367,7 +360,8 @@ def test_a_replay_sees_a_ball_that_is_missing_another_or_elsewhere(thrown: Made)
     moved = replay([changed(replace(one, position=(x, y, np.nextafter(z, 9.0))))]).difference
 
     assert heavier is not None and heavier.quantity in ("position", "velocity", "ball")
-    assert heavier.tick > ticks[0] + 20  # no sooner than it hits
+    # No sooner than it hits; but MuJoCo turns a ball in flight by 1e-19 rad, by its inertia.
+    assert heavier.tick > ticks[0] + (20 if DEFAULT_ENGINE == "bullet" else 0)
     assert elsewhere is not None
     assert moved is not None and moved.quantity == "ball" and moved.tick == ticks[0] + 2
     assert "'ball_1': z in m was" in str(moved)

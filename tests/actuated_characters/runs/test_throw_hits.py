@@ -14,7 +14,7 @@ from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.simulation import Simulation
-from tests.support.engines import pybullet
+from tests.support.engines import links_at_ball
 from tests.support.physics import character
 from tests.support.thrown_states import watch_states
 
@@ -33,19 +33,13 @@ def run_and_list_hits(plan: RunPlan, throws: Sequence[PlannedThrow]) -> tuple[St
 
     def watch(run: Simulation) -> None:
         watch_states(states, run)
-        for row, ball in enumerate(run._world.balls.numbers):
-            if hits[row] is None and (links := _pushed_links(run, ball)):
+        for row in range(len(run._world.balls.throws)):
+            if hits[row] is None and (links := links_at_ball(run, row, least_force=0.0)):
                 hits[row] = len(states) / RATE, links
 
     for _ in ticks_in_process(plan, (), throws, watch=watch):
         pass
     return states, hits
-
-
-def _pushed_links(run: Simulation, ball: int) -> frozenset[str]:
-    body = run.characters[0]._body
-    points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
-    return frozenset(LINKS[body._row[point[4]]] for point in points if point[9] > 0.0)
 
 
 def hold_plan(**simulator: object) -> RunPlan:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
+import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -132,6 +133,22 @@ def test_a_message_that_the_loop_does_not_take_is_the_executors_and_wakes_the_lo
     # Assert
     assert heard == ["by the way"]
     assert rests < 4
+
+
+def test_a_wait_of_a_context_that_another_thread_has_ended_is_over(domain: int) -> None:
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    listener = Node("listener", context=context)
+    spinner = PollingExecutor(listener)
+    subscription = DirectSubscription(listener, Topic("beat", "std_msgs/msg/String", Quality(1)))
+    try:
+        context.shutdown()
+
+        assert not spinner._wait_for_message(0.01)
+    finally:
+        subscription.close()
+        spinner.close()
+        listener.destroy_node()
 
 
 def test_tries_that_do_not_pay_are_left_out_ever_longer_and_come_back_when_they_do() -> None:

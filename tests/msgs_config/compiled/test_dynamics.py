@@ -11,6 +11,7 @@ import pytest
 from controller_node.control_laws import stable_pd_effort
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.compiled import dynamics as compiled
 from tests.support.physics import character, random_state
 
 PERIOD = 1.0 / 240.0
@@ -84,8 +85,9 @@ def test_a_state_is_taken_over_as_mujoco_does() -> None:
         lambda array: np.repeat(array, 2)[::2],
         lambda array: np.flip(array[::-1].copy()),
         lambda array: np.frombuffer(array.tobytes()),
+        lambda array: array.tolist(),
     ],
-    ids=["every second entry", "from the end", "read-only"],
+    ids=["every second entry", "from the end", "read-only", "Python's floats"],
 )
 def test_any_array_is_read_as_the_one_it_equals(
     given: Callable[[FloatArray], FloatArray],
@@ -119,10 +121,29 @@ def test_a_copy_takes_over_states_of_its_own(
     np.testing.assert_array_equal(other.mass_matrix(), fresh.mass_matrix())
 
 
-def test_arrays_of_other_numbers_are_refused_and_nothing_more_is_compiled() -> None:
-    model = DynamicsModel(character("pendulum"))
+@pytest.mark.parametrize("kind", [np.float32, int])
+def test_other_numbers_are_taken_as_the_doubles_that_they_equal(kind: type) -> None:
+    whole = character("humanoid")
+    model, rng = DynamicsModel(whole), np.random.default_rng(8)
+    others = [
+        (3.0 * each).astype(kind) for each in (*random_state(whole, rng), *random_state(whole, rng))
+    ]
+    doubles = [each.astype(float) for each in others]
+    gains = random_gains(rng, whole.layout.size)
+
+    found = model.stable_pd(*others, *gains, PERIOD)
+    np.testing.assert_array_equal(found, model.stable_pd(*doubles, *gains, PERIOD))
+
+    model.update(*others[:2])
+    bias = model.bias_force()
+    model.update(*doubles[:2])
+    np.testing.assert_array_equal(bias, model.bias_force())
+
+
+def test_nothing_more_is_compiled_for_other_numbers() -> None:
+    model, singles = DynamicsModel(character("pendulum")), np.zeros(1, dtype=np.float32)
     with pytest.raises(TypeError, match="No matching definition"):
-        model.update(np.zeros(1, dtype=np.float32), np.zeros(1))
+        compiled.take_state(model.view, singles, singles)
 
 
 @pytest.mark.parametrize("length", [0, 3, 50])
