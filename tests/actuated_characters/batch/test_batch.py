@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from actuated_characters.batch.worlds import Batch
 from actuated_characters.environments.track import TrackEnv
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClosedError, SimulationError
+from sim_node.physics.mujoco.batch import MujocoBatch
 
 WALK: dict[str, Any] = {"clip": "walk"}
 CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
@@ -190,6 +192,31 @@ def test_what_a_batch_cannot_is_refused_in_one_line(given: dict[str, Any], messa
         Batch(ac.load_character("humanoid"), **{"count": 1, **given})
 
     assert message in str(refused.value)
+
+
+def test_a_world_whose_contacts_have_no_room_fails_alone() -> None:
+    batch = Batch(ac.load_character("humanoid"), 2, threads=1, **WALK)
+    engine = batch._batch
+    assert isinstance(engine, MujocoBatch)
+    (worker,) = engine._workers
+    engine._held[1].warning[mujoco.mjtWarning.mjWARN_CONTACTFULL].number = 1  # type: ignore[attr-defined]
+
+    batch.step()
+
+    assert batch.diverged.tolist() == [True, False]
+    assert batch.ticks.tolist() == [0, 1]
+    batch.reset([0])
+    batch.step()
+    assert not batch.diverged.any()
+    assert worker.step.applied.tolist() == [0.0] * 34
+
+
+def test_what_is_shown_cannot_be_written() -> None:
+    batch = Batch(ac.load_character("pendulum"), 1, watch_contacts=True)
+
+    for shown in (batch.position, batch.velocity, batch.motion, batch.contacts):
+        with pytest.raises(ValueError, match="read-only"):
+            shown[0] = 1.0
 
 
 def test_joints_with_damping_are_refused() -> None:
