@@ -13,6 +13,7 @@ from actuated_characters.environments.track import TrackEnv
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClosedError, SimulationError
 from sim_node.physics.mujoco.batch import MujocoBatch
+from tests.support.hands import hand_on_a_body
 
 WALK: dict[str, Any] = {"clip": "walk"}
 CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
@@ -23,7 +24,7 @@ CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "no velocity": ("humanoid", {**WALK, "reference_velocity": "zero"}, {}),
     "in the air": ("humanoid", WALK, {"terrain": "none", "gravity": 1.6}),
     "laikago": ("laikago", {}, {}),
-    "bounded speeds": ("franka_panda", {"reference": "sine"}, {}),
+    "panda": ("franka_panda", {"reference": "sine"}, {}),
     "kuka": ("kuka", {}, {"gravity": 3.71}),
     "pendulum": ("pendulum", {}, {}),
 }
@@ -81,6 +82,28 @@ def test_a_world_is_a_simulation_with_its_controller(case: str) -> None:
     assert first == third == simulation.state_hash
     assert first != unpushed
     assert batch.ticks.tolist() == [100] * 3
+
+
+def test_speeds_are_bounded_where_a_simulation_bounds_them(tmp_path: Path) -> None:
+    file = tmp_path / "hand.urdf"
+    file.write_text(hand_on_a_body())
+    character = ac.load_character(file)
+    batch = Batch(character, 1, action="torques", hash_states=True, reference="hold")
+    begin = np.array([batch.start.position]), np.array([batch.start.velocity])
+    begin[1][0, 6:] = 300.0
+    first = ac.StampedState(0, begin[0][0], begin[1][0], None)
+    simulation = ac.Simulation(character, first, engine="mujoco")
+    batch.reset(position=begin[0], velocity=begin[1])
+    simulation.reset()
+
+    for _ in range(30):
+        simulation.step(np.zeros(character.layout.size))
+    batch.step(ticks=30)
+
+    assert batch.state_hashes[0] == simulation.state_hash
+    batch.reset(position=begin[0], velocity=begin[1])
+    batch.step()
+    assert np.abs(batch.velocity).max() == 100.0
 
 
 @pytest.mark.parametrize("threads", [2, 3])
