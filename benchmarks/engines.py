@@ -10,7 +10,7 @@ from rich.console import Console
 import actuated_characters as ac
 from actuated_characters.runs.plan import make_plan
 from benchmarks.closed_loop import WALK
-from benchmarks.support.mujoco_loops import MujocoLoop, ServoLoop
+from benchmarks.support.mujoco_loops import MujocoLoop, ServoLoop, StepAlone
 from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from controller_node.parameters import make_controller
@@ -21,6 +21,7 @@ _BLOCK, _BLOCKS, _WARM_UP = 32, 60, 3  # ticks; blocks of each, in turn
 _WORLDS = 16
 _TICKS = _BLOCK * _BLOCKS + 1
 _PEER, _SERVOS = "MuJoCo, stable PD in numpy", "MuJoCo, servos in C"
+_ALONE = "MuJoCo, its step alone in the same states"
 _BATCH = f"a batch of {_WORLDS}, one thread, a humanoid"
 
 
@@ -41,6 +42,11 @@ def measure_engines(console: Console) -> list[Ratio]:
             for engine in INSTALLED_ENGINES
         ),
         Ratio("tick of a batch", costs[_BATCH][0] / servos, f"a humanoid's tick / {_SERVOS}"),
+        Ratio(
+            "tick of a batch, law",
+            costs[_BATCH][1] / costs[_ALONE][1],
+            f"a humanoid's tick / {_ALONE}, medians",
+        ),
     ]
 
 
@@ -75,7 +81,13 @@ def _peers(character: Character) -> dict[str, Callable[[int], object]]:
     states = [plan.reference.sample(tick / 240.0) for tick in range(_TICKS + 1)]
     gains = make_controller(character, plan.reference, plan.controller).settings.gains
     arguments = (character, states, gains.stiffness, gains.damping)
-    peers = {_PEER: MujocoLoop(*arguments).step, _SERVOS: ServoLoop(*arguments).step}
+    controller = ac.Controller(character, clip="walk")
+    simulation = ac.Simulation(character, controller.start, engine="mujoco")
+    peers = {
+        _PEER: MujocoLoop(*arguments).step,
+        _SERVOS: ServoLoop(*arguments).step,
+        _ALONE: StepAlone(controller, simulation, _TICKS).step,
+    }
     return {label: partial(_repeat, step) for label, step in peers.items()}
 
 

@@ -128,18 +128,18 @@ class Batch:
 
     @property
     def motion(self) -> FloatArray:
-        """Positions and velocities (count, 2, n) now; the array that each step writes to."""
-        return self._states.motion
+        """Positions and velocities (count, 2, n) now; what it shows changes with the next step."""
+        return _shown(self._states.motion)
 
     @property
     def position(self) -> FloatArray:
-        """Positions (count, n) now, message form; a view, which the next step writes to."""
-        return self._states.motion[:, 0]
+        """Positions (count, n) now, message form; as `motion`."""
+        return self.motion[:, 0]
 
     @property
     def velocity(self) -> FloatArray:
-        """Velocities (count, n) now; a view, which the next step writes to."""
-        return self._states.motion[:, 1]
+        """Velocities (count, n) now; as `motion`."""
+        return self.motion[:, 1]
 
     @property
     def ticks(self) -> IntArray:
@@ -160,14 +160,14 @@ class Batch:
     def contacts(self) -> FloatArray:
         """Net contact wrenches (count, links, 6) of the last tick: N and N m, world axes.
 
-        A view, which the next step writes to.
+        What it shows changes with the next step.
 
         Raises:
             ConfigurationError: the batch does not watch contacts.
         """
         if not len(self._states.contacts):
             raise ConfigurationError("contacts are not watched; make it with watch_contacts=True")
-        return self._states.contacts
+        return _shown(self._states.contacts)
 
     @property
     def action_size(self) -> int:
@@ -317,3 +317,10 @@ class Batch:
         self._samples = np.array([self._sample(row) for row in self._rows])
         velocities = self._samples[:, 1] * self._follows_velocity
         self._batch.set_reference(first, self._samples[:, 0], velocities)
+
+
+def _shown(array: FloatArray) -> FloatArray:
+    """An array to be read alone."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

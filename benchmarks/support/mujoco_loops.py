@@ -6,10 +6,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
+import actuated_characters as ac
 from controller_node.planner.contact_model import ContactModel
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from sim_node.physics.mujoco.world import MujocoWorld
 
 _PERIOD = 1.0 / 240.0  # s
 
@@ -68,3 +70,25 @@ class ServoLoop(MujocoLoop):
         self._tick += 1
         self.model.qpos_spring[:] = self._positions[self._tick]
         mujoco.mj_step(self.model, self.data)
+
+
+class StepAlone:
+    """MuJoCo's own step, in C, of a simulation's world in the states of its walk: no law in it."""
+
+    def __init__(self, controller: ac.Controller, simulation: ac.Simulation, ticks: int) -> None:
+        world = simulation._simulation._world
+        assert isinstance(world, MujocoWorld)
+        self._model, self._data = world.model, mujoco.MjData(world.model)
+        self._states = []
+        for _ in range(ticks):
+            effort = controller.compute_effort(simulation.state)
+            self._states.append((world.data.qpos.copy(), world.data.qvel.copy(), effort))
+            simulation.step(effort)
+        self._tick = 0
+
+    def step(self) -> None:
+        """The next tick of the walk, which begins again after its end."""
+        data = self._data
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = self._states[self._tick]
+        self._tick = (self._tick + 1) % len(self._states)
+        mujoco.mj_step(self._model, data)

@@ -23,7 +23,7 @@ from sim_node.physics.mujoco.world import MujocoWorld
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.soft_limits import limits_and_room
 
-_SHARES = 4  # parts a thread takes of the worlds, so that a late one does not hold up all
+_SHARES = 2  # parts a thread takes of the worlds, so that a late one does not hold up all
 _LEAST_SHARE = 8  # worlds, below which a part would cost more than it brings
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -11,6 +12,8 @@ from actuated_characters.batch.worlds import Batch
 from actuated_characters.environments.track import TrackEnv
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClosedError, SimulationError
+from sim_node.physics.mujoco.batch import MujocoBatch
+from tests.support.hands import hand_on_a_body
 
 WALK: dict[str, Any] = {"clip": "walk"}
 CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
@@ -21,7 +24,7 @@ CASES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "no velocity": ("humanoid", {**WALK, "reference_velocity": "zero"}, {}),
     "in the air": ("humanoid", WALK, {"terrain": "none", "gravity": 1.6}),
     "laikago": ("laikago", {}, {}),
-    "bounded speeds": ("franka_panda", {"reference": "sine"}, {}),
+    "panda": ("franka_panda", {"reference": "sine"}, {}),
     "kuka": ("kuka", {}, {"gravity": 3.71}),
     "pendulum": ("pendulum", {}, {}),
 }
@@ -79,6 +82,28 @@ def test_a_world_is_a_simulation_with_its_controller(case: str) -> None:
     assert first == third == simulation.state_hash
     assert first != unpushed
     assert batch.ticks.tolist() == [100] * 3
+
+
+def test_speeds_are_bounded_where_a_simulation_bounds_them(tmp_path: Path) -> None:
+    file = tmp_path / "hand.urdf"
+    file.write_text(hand_on_a_body())
+    character = ac.load_character(file)
+    batch = Batch(character, 1, action="torques", hash_states=True, reference="hold")
+    begin = np.array([batch.start.position]), np.array([batch.start.velocity])
+    begin[1][0, 6:] = 300.0
+    first = ac.StampedState(0, begin[0][0], begin[1][0], None)
+    simulation = ac.Simulation(character, first, engine="mujoco")
+    batch.reset(position=begin[0], velocity=begin[1])
+    simulation.reset()
+
+    for _ in range(30):
+        simulation.step(np.zeros(character.layout.size))
+    batch.step(ticks=30)
+
+    assert batch.state_hashes[0] == simulation.state_hash
+    batch.reset(position=begin[0], velocity=begin[1])
+    batch.step()
+    assert np.abs(batch.velocity).max() == 100.0
 
 
 @pytest.mark.parametrize("threads", [2, 3])
@@ -190,6 +215,31 @@ def test_what_a_batch_cannot_is_refused_in_one_line(given: dict[str, Any], messa
         Batch(ac.load_character("humanoid"), **{"count": 1, **given})
 
     assert message in str(refused.value)
+
+
+def test_a_world_whose_contacts_have_no_room_fails_alone() -> None:
+    batch = Batch(ac.load_character("humanoid"), 2, threads=1, **WALK)
+    engine = batch._batch
+    assert isinstance(engine, MujocoBatch)
+    (worker,) = engine._workers
+    engine._held[1].warning[mujoco.mjtWarning.mjWARN_CONTACTFULL].number = 1  # type: ignore[attr-defined]
+
+    batch.step()
+
+    assert batch.diverged.tolist() == [True, False]
+    assert batch.ticks.tolist() == [0, 1]
+    batch.reset([0])
+    batch.step()
+    assert not batch.diverged.any()
+    assert worker.step.applied.tolist() == [0.0] * 34
+
+
+def test_what_is_shown_cannot_be_written() -> None:
+    batch = Batch(ac.load_character("pendulum"), 1, watch_contacts=True)
+
+    for shown in (batch.position, batch.velocity, batch.motion, batch.contacts):
+        with pytest.raises(ValueError, match="read-only"):
+            shown[0] = 1.0
 
 
 def test_joints_with_damping_are_refused() -> None:
