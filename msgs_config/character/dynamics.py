@@ -1,5 +1,7 @@
 """The model of the dynamics on both sides of the loop: MuJoCo behind one class."""
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -100,7 +102,7 @@ class DynamicsModel:
         try:
             effort = compiled.stable_pd(self.view, *given, period)
         except TypeError:  # likewise
-            effort = compiled.stable_pd(self.view, *_doubles(*given), float(period))
+            effort = compiled.stable_pd(self.view, *_doubles(*given), period=float(period))
         return effort
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
@@ -319,7 +321,7 @@ class DynamicsModel:
         return jacobian
 
 
-def _doubles(*arrays: FloatArray) -> list[FloatArray]:
+def _doubles(*arrays: FloatArray) -> Any:
     return [np.asarray(array, dtype=np.float64) for array in arrays]
 
 
