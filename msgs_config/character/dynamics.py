@@ -102,7 +102,7 @@ class DynamicsModel:
         try:
             effort = compiled.stable_pd(self.view, *given, period)
         except TypeError:  # likewise
-            effort = compiled.stable_pd(self.view, *_doubles(*given), period=float(period))
+            effort = compiled.stable_pd(self.view, *_doubles(*given, period))
         return effort
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
@@ -321,8 +321,8 @@ class DynamicsModel:
         return jacobian
 
 
-def _doubles(*arrays: FloatArray) -> Any:
-    return [np.asarray(array, dtype=np.float64) for array in arrays]
+def _doubles(*numbers: FloatArray | float) -> Any:
+    return [np.asarray(each, dtype=np.float64)[()] for each in numbers]
 
 
 def still_model(character: Character, position: FloatArray) -> DynamicsModel:
