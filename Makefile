@@ -4,8 +4,11 @@
 BIN := .venv/bin
 PACKAGING := setup.py setup.cfg pyproject.toml
 PYTHON ?=
-BULLET ?=
-SUPPORTED := import sys, ensurepip, venv; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
+SUPPORTED := import sys, ensurepip, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
+
+# The last answer holds for .venv until there is another one.
+LAST_BULLET := $(shell cat .venv/.bullet 2>/dev/null)
+BULLET ?= $(LAST_BULLET)
 
 # Robots of other makers, as data alone; most of these packages need much more than their files do.
 ROBOTS := example-robot-data==6.0.0 icub-models==3.2.0 mani-skill==3.0.1 rtb-data==2.0.0 scikit-robot==0.4.7
@@ -25,8 +28,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 help: ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-16s %s\n", $$1, $$2 }'
-	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 or 3.12)."
-	@echo "BULLET=1 (in make venv) compiles PyBullet where it has no wheel (from 3.12 on), BULLET=0 leaves it out: the engine is then MuJoCo."
+	@echo "PYTHON=... chooses the interpreter of a new .venv (3.11 to 3.13)."
+	@echo "BULLET=1 (in make venv) compiles PyBullet where it has no wheel (from 3.12 on), BULLET=0 leaves it out: the engine is then MuJoCo. Later targets keep to it."
 
 venv: .venv/.installed ## Set up .venv
 
@@ -109,11 +112,11 @@ distclean: clean ## Remove .venv too
 	rm -rf .venv
 
 .venv/.created:
-	@found=; for python in $(or $(PYTHON),python3.11 python3.12 python3); do \
+	@found=; for python in $(or $(PYTHON),python3.11 python3.12 python3.13 python3); do \
 	    if $$python -c '$(SUPPORTED)' 2>/dev/null; then found=$$python; break; fi; \
 	done; \
 	if [ -z "$$found" ]; then \
-	    echo "error: $(if $(PYTHON),PYTHON=$(PYTHON) is not,found no) Python 3.11 or 3.12 with venv; say which: make PYTHON=/path/to/python3.11" >&2; \
+	    echo "error: $(if $(PYTHON),PYTHON=$(PYTHON) is not,found no) Python 3.11, 3.12 or 3.13 with venv; say which: make PYTHON=/path/to/python3.11" >&2; \
 	    exit 1; \
 	fi; \
 	version=$$($$found -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
@@ -121,6 +124,10 @@ distclean: clean ## Remove .venv too
 	echo "setting up .venv with Python $$version ($$time) ..."; \
 	$$found -m venv --clear .venv
 	@touch $@
+
+ifneq ($(BULLET),$(LAST_BULLET))
+.PHONY: .venv/.installed .venv/.installed-view .venv/.installed-test
+endif
 
 .venv/.installed: $(PACKAGING) | .venv/.created
 	@echo "installing the package into .venv ..."
@@ -144,11 +151,9 @@ PIP := $(BIN)/python -m pip
 define install
 @$(PIP) install -qq -e '.[$(1)$(if $(filter 1,$(BULLET)),$(COMMA)bullet)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 $(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
-@$(BIN)/python -c '$(HAS_DATA)' || { echo "fetching the package pybullet_data (140 MB) ..." && $(FETCH) && $(BIN)/python -c '$(UNPACK)'; } || { echo "$(PIP_FAILED)" >&2; exit 1; }
+@$(BIN)/python -m msgs_config.fetch_robots || { echo "$(PIP_FAILED)" >&2; exit 1; }
 @$(BIN)/python -c '$(COMPILE)'
+@echo '$(BULLET)' > .venv/.bullet
 endef
-HAS_DATA := import importlib.util, sys; sys.exit(importlib.util.find_spec("pybullet_data") is None)
-FETCH := $(PIP) download -qq --no-deps --only-binary :all: --implementation cp --python-version 3.11 --platform manylinux2014_x86_64 --dest build/pybullet pybullet==3.2.7
-UNPACK := import glob, sysconfig, zipfile; z = zipfile.ZipFile(glob.glob("build/pybullet/pybullet-*.whl")[0]); z.extractall(sysconfig.get_path("purelib"), [n for n in z.namelist() if n.startswith("pybullet_data/")])
 COMPILE := import actuated_characters.render.engine.render_scene, sim_node.physics.mujoco.world, sim_node.physics.soft_limits
 PIP_FAILED := error: pip failed. It needs the network, and the wheels of ROS 2 are for Linux on x86-64 only.

@@ -25,7 +25,7 @@ setup(
     description="Physically simulated characters, actuated by torques over ROS 2 topics.",
     maintainer="actuated_characters developers",
     license="Apache-2.0",
-    python_requires=">=3.11,<3.13",
+    python_requires=">=3.11,<3.14",
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
         "": ["py.typed"],
@@ -59,8 +59,8 @@ setup(
         "numba>=0.61,<0.70",
         "numpy>=1.26,<3",
         "pillow>=9.1",  # textures of meshes; matplotlib needs it as well
-        # Exactly, likewise, where it has a wheel; elsewhere the engine is MuJoCo, and the package
-        # `pybullet_data`, which comes with it, is fetched as the Makefile does.
+        # Exactly, likewise, where it has a wheel; elsewhere the engine is MuJoCo, and the robots
+        # that come with it are to be had by `python -m msgs_config.fetch_robots`.
         "pybullet==3.2.7; python_version < '3.12'",
         "pycollada>=0.9,<0.10",  # meshes of every eighth robot (1.7 MB, BSD-3, pure Python)
         "PyYAML>=6.0,<7",

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from actuated_characters.api import Controller as Controller
     from actuated_characters.api import Simulation as Simulation
     from actuated_characters.api import run as run
+    from actuated_characters.batch.worlds import Batch as Batch
     from msgs_config.character.loading import load_character as load_character
     from msgs_config.character.model import Character as Character
     from msgs_config.errors import ActuatedCharactersError as ActuatedCharactersError
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "ActuatedCharactersError": "msgs_config.errors",
+    "Batch": "actuated_characters.batch.worlds",
     "Character": "msgs_config.character.model",
     "Controller": "actuated_characters.api",
     "Simulation": "actuated_characters.api",

@@ -29,6 +29,7 @@ from msgs_config.character.joints.followers import check_undriven
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, SimulationError
 from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.parameters import Values
 from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
@@ -177,16 +178,10 @@ class Simulation:
             ActuatedCharactersError: a name or a value is wrong.
         """
         given = plain_parameters(parameters, more)
-        character = placed(character, given)
-        begins: Mapping[str, object] = _NOTHING
-        if start is not None:
-            begins = as_values(finite_state(start, character.layout.size))
-        everything = {"commanded_joints": _drivable(character), **begins, **given}
-        self._values = simulator_parameters.resolve_alone(character, everything)
-        self.character = character
-        setup = make_character_setup(character, self._values)
-        settings = make_simulation_settings(self._values)
-        self._simulation = simulation.Simulation([setup], settings)
+        self._values = simulator_values(character, start, given)
+        setup = make_character_setup(placed(character, given), self._values)
+        self.character = setup.character
+        self._simulation = simulation.Simulation([setup], make_simulation_settings(self._values))
         self._simulation.watches_contacts = watch_contacts
         self._drives_all = bool(self._simulation.characters[0].commanded.all())
         self._pushes = WrenchQueue(character)
@@ -412,6 +407,19 @@ def run(
     return read_metrics(directory)[0]
 
 
-def _drivable(character: Character) -> list[str]:
-    """The joints that have a motor, and the root of a floating base."""
-    return ["root"] * character.layout.has_floating_base + character.layout.actuated_joint_names
+def simulator_values(
+    character: Character, start: StampedState | None, given: Mapping[str, object]
+) -> Values:
+    """The parameters of a simulator of one character that drives all that has a motor.
+
+    And the root of a floating base. `start` is where it begins; None: in its rest pose.
+
+    Raises:
+        ActuatedCharactersError: a name or a value is wrong.
+    """
+    character = placed(character, given)
+    layout = character.layout
+    begins = {} if start is None else as_values(finite_state(start, layout.size))
+    drivable = ["root"] * layout.has_floating_base + layout.actuated_joint_names
+    everything = {"commanded_joints": drivable, **begins, **given}
+    return simulator_parameters.resolve_alone(character, everything)

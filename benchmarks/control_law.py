@@ -10,12 +10,12 @@ from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from benchmarks.closed_loop import WALK
-from benchmarks.support.deep_mimic import DeepMimicStablePd
 from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from controller_node.control_laws import LAWS
 from controller_node.parameters import make_controller
 from controller_node.references.base import Reference, ReferenceState
+from sim_node.physics.engine import INSTALLED_ENGINES
 
 _DURATION = 5.0  # s of simulated time
 _ROUNDS = 7  # over all states; the best round counts, in which others disturbed the least
@@ -23,7 +23,12 @@ _NEEDS_A_FILE = "feedforward"
 
 
 def measure_control_laws(console: Console) -> list[Ratio]:
-    """Measure and print the table; the ratio of each law to PyBullet's."""
+    """Measure and print the table; the ratio of each law to PyBullet's, where that is installed."""
+    if "bullet" not in INSTALLED_ENGINES:
+        console.print("control laws: there is no PyBullet, whose own law they are measured by")
+        return []
+    from benchmarks.support.deep_mimic import DeepMimicStablePd
+
     console.print("control laws: humanoid ...")
     ticks = list(ticks_in_process(make_plan("humanoid", _DURATION, WALK, {}, {})))
     with DeepMimicStablePd() as theirs:

@@ -16,14 +16,13 @@ from benchmarks.support.chains import write_chain
 from benchmarks.support.nodes import Nodes
 from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
-from benchmarks.support.timing import timed
+from benchmarks.support.timing import timed, timed_engine
 from msgs_config.arrays import FloatArray
 from msgs_config.bus.dds import create_publisher
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
 from sim_node.parameters import CharacterParameters, SimulatorParameters, load_parameters
-from sim_node.physics.bullet.world import BulletWorld
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_simulation
 
@@ -111,7 +110,7 @@ def humanoids(count: int) -> dict[str, object]:
 def _measure(label: str, given: Mapping[str, object]) -> Cost:
     loaded = load_parameters(given)
     dofs = sum(each.character.layout.size for each in loaded.characters)
-    with timed(BulletWorld, "step") as engine:
+    with timed_engine() as engine:
         alone = np.median(1e6 * step_durations(loaded))
     engine_us = 1e6 * float(np.median(engine[-_TICKS:]))
     return Cost(label, dofs, engine_us, float(alone), _over_topics(loaded, given))

@@ -19,8 +19,7 @@ from benchmarks.support.machine import describe_machine
 from benchmarks.support.printed import make_table
 from benchmarks.support.ratios import Ratio
 from benchmarks.support.round_trip import round_trips
-from benchmarks.support.timing import TickTimes, timed
-from sim_node.physics.bullet.world import BulletWorld
+from benchmarks.support.timing import TickTimes, timed_engine
 
 _COUNT = 5000  # round trips
 _DURATION = 20.0  # s of simulated time
@@ -86,7 +85,7 @@ def measure_lockstep(console: Console) -> list[Ratio]:
 def _measure(plan: RunPlan) -> dict[str, TickTimes]:
     """The times of one character, by the letters of what was measured."""
     layout = plan.character.layout
-    with timed(BulletWorld, "step") as steps:
+    with timed_engine() as steps:
         in_process(plan)
     times = {
         "e": TickTimes.of(np.array(steps)),

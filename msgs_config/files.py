@@ -27,7 +27,7 @@ MAX_XML_NESTING = 64
 _PACKAGE = "package://"
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _REMEDIES = {
-    "pybullet_data": "; it comes with PyBullet: pip install pybullet, or in a clone make venv"
+    "pybullet_data": "; it comes with PyBullet, and alone by: python -m msgs_config.fetch_robots"
 }
 """By the package's name, how to get one that the shipped characters' files name."""
 _LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification

@@ -11,4 +11,8 @@ import gymnasium  # noqa: E402 - after the check
 
 TRACK = "actuated_characters/Track-v0"
 
-gymnasium.register(TRACK, entry_point="actuated_characters.environments.track:TrackEnv")
+gymnasium.register(
+    TRACK,
+    entry_point="actuated_characters.environments.track:TrackEnv",
+    vector_entry_point="actuated_characters.environments.track_vector:TrackVectorEnv",
+)

@@ -47,8 +47,7 @@ class TorqueActuation:
     def __init__(self, character: Character) -> None:
         layout = character.layout
         self._actuated = layout.mask(layout.actuated_joint_names)
-        bound = np.repeat(character.effort_limits(), layout.vector_lengths)[self._actuated]
-        self.space: spaces.Space[FloatArray] = spaces.Box(-bound, bound, dtype=np.float64)
+        self.space = action_space(TORQUES, character)
         self._effort = np.zeros(layout.size)
 
     def hold(self, action: FloatArray) -> None:
@@ -101,10 +100,7 @@ class TargetActuation:
         self._actuated = self._layout.mask(self._layout.actuated_joint_names)
         self._still = np.zeros(self._layout.size)
         self._is_absolute = action == ANGLES
-        lower, upper = _angle_bounds(character) if self._is_absolute else _offset_bounds(character)
-        self.space: spaces.Space[FloatArray] = spaces.Box(
-            lower[self._actuated], upper[self._actuated], dtype=np.float64
-        )
+        self.space = action_space(action, character)
         self._offset: FloatArray | None = None  # (n,); None: nothing is added, not even a zero
         # Takes the place of the reference's position.
         self._target: GeneralizedPosition | None = None
@@ -146,6 +142,18 @@ def check_action(action: str) -> None:
     """Raise ConfigurationError if it is none of `ACTIONS`."""
     if action not in ACTIONS:
         raise ConfigurationError(one_of("action", action, list(ACTIONS)))
+
+
+def action_space(action: str, character: Character) -> spaces.Space[FloatArray]:
+    """The actions (a,) of a kind, one entry an actuated degree of freedom."""
+    layout = character.layout
+    if action == TORQUES:
+        upper = np.repeat(character.effort_limits(), layout.vector_lengths)
+        lower = -upper
+    else:
+        lower, upper = (_angle_bounds if action == ANGLES else _offset_bounds)(character)
+    actuated = layout.mask(layout.actuated_joint_names)
+    return spaces.Box(lower[actuated], upper[actuated], dtype=np.float64)
 
 
 def _offset_bounds(character: Character) -> tuple[FloatArray, FloatArray]:

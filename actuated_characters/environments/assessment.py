@@ -7,19 +7,20 @@ over joints, c the centre of mass, d of the desired state at the new state's tim
 """
 
 import math
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 
 from actuated_characters.metrics.error_measures import FARTHEST
 from actuated_characters.metrics.falls import FallWatch, reader_for
-from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.geometry import fixed_order, scalars
-from msgs_config.messages.state import StampedState
 
+Motion: TypeAlias = Sequence[FloatArray] | FloatArray
+"""Position and velocity (n,) each, message form."""
 Terrain: TypeAlias = UrdfOptions | None
 _DOWNWARDS = (0.0, 0.0, -1.0)
 _BASE_DOFS = 6  # entries of a floating base
@@ -57,41 +58,40 @@ class Assessment:
         """How many numbers an observation has."""
         return int(self._parts[-1])
 
-    def observation(self, state: StampedState, ahead: ReferenceState) -> FloatArray:
+    def observation(self, state: Motion, ahead: Motion) -> FloatArray:
         """The observation (k,) of a state, with the desired state that lies ahead."""
         base, position, velocity, error, _ = self._parts
+        where, speed = state
         seen = np.empty(self.size)
         if self._floats:
-            axes = scalars.axes(scalars.exp(state.position[3:_BASE_DOFS].tolist()))
-            seen[0] = state.position[2]
+            axes = scalars.axes(scalars.exp(where[3:_BASE_DOFS].tolist()))
+            seen[0] = where[2]
             seen[1:4] = scalars.to_child(axes, _DOWNWARDS)
-            seen[4:7] = scalars.to_child(axes, state.velocity[:3].tolist())
-            seen[7:base] = state.velocity[3:_BASE_DOFS]
-        seen[base:position] = state.position[self._joints]
-        seen[position:velocity] = state.velocity[self._joints]
+            seen[4:7] = scalars.to_child(axes, speed[:3].tolist())
+            seen[7:base] = speed[3:_BASE_DOFS]
+        seen[base:position] = where[self._joints]
+        seen[position:velocity] = speed[self._joints]
         seen[velocity:error] = self._error(state, ahead)
-        seen[error:] = ahead.velocity
+        seen[error:] = ahead[1]
         return seen
 
-    def reward(self, state: StampedState, desired: ReferenceState) -> tuple[float, bool]:
+    def reward(self, state: Motion, desired: Motion) -> tuple[float, bool]:
         """The reward of a state, 0 to 1, and whether the motion is lost."""
         turn = self._error(state, desired)[self._joints]
-        spin = (desired.velocity - state.velocity)[self._joints]
-        centre = self._model.centre_of_mass_at(state.position)
-        wanted = self._model.centre_of_mass_at(desired.configuration.position)
+        spin = (desired[1] - state[1])[self._joints]
+        centre = self._model.centre_of_mass_at(state[0])
+        wanted = self._model.centre_of_mass_at(desired[0])
         pose = 0.65 * math.exp(-2.0 * float(fixed_order.dot(turn, turn)))
         speed = 0.1 * math.exp(-0.1 * float(fixed_order.dot(spin, spin)))
         away = wanted - centre
         place = 0.25 * math.exp(-10.0 * float(fixed_order.dot(away, away)))
         return pose + speed + place, self._is_over(state, desired, away)
 
-    def _is_over(self, state: StampedState, desired: ReferenceState, away: FloatArray) -> bool:
+    def _is_over(self, state: Motion, desired: Motion, away: FloatArray) -> bool:
         """Whether an episode ends: it fell, or its centre of mass is far, by `away` (3,) m."""
-        fell = self.fall is not None and self.fall.has_fallen(
-            state.position, desired.configuration.position
-        )
+        fell = self.fall is not None and self.fall.has_fallen(state[0], desired[0])
         return fell or (self._floats and bool(fixed_order.norm(away) > FARTHEST))
 
-    def _error(self, state: StampedState, desired: ReferenceState) -> FloatArray:
+    def _error(self, state: Motion, desired: Motion) -> FloatArray:
         """The error (n,) from a state to a desired one: `JointLayout.difference`."""
-        return self._model.compute_error(state.position, desired.configuration.position)
+        return self._model.compute_error(state[0], desired[0])

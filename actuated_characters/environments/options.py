@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.render.engine.camera_pose import Size
-from actuated_characters.runs.plan import SHARED, choose_reference
+from actuated_characters.runs.plan import choose_reference
 from controller_node import parameters
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
@@ -19,31 +19,7 @@ RENDER_MODES = ["rgb_array"]
 
 _RESET_OPTIONS = ["start"]
 # Parameters of the controller that would act beside an action, and the one value that does not.
-_UNAIDED_PARAMETERS = {"planner": "none", "behaviour": "tracking", "root_assistance": False}
-
-
-def with_shared(
-    simulator: Mapping[str, object],
-    controller: Mapping[str, object],
-    reference: Mapping[str, object],
-) -> tuple[dict[str, object], dict[str, object]]:
-    """The parameters given for the simulator and for the controller, with those of both sides.
-
-    Raises:
-        ConfigurationError: one that both must agree on is given with two values.
-    """
-    ours = {**controller, **reference}
-    both: dict[str, object] = {}
-    for name in SHARED:
-        values = [side[name] for side in (simulator, ours) if name in side]
-        if len(values) == 2 and values[0] != values[1]:
-            raise ConfigurationError(
-                f"parameter '{name}' is {values[0]} for the simulator and {values[1]} for the "
-                "controller; it must be the same"
-            )
-        if values:
-            both[name] = values[0]
-    return {**simulator, **both}, {**ours, **both}
+UNAIDED_PARAMETERS = {"planner": "none", "behaviour": "tracking", "root_assistance": False}
 
 
 def controller_values(character: Character, given: Mapping[str, object]) -> Values:
@@ -52,13 +28,13 @@ def controller_values(character: Character, given: Mapping[str, object]) -> Valu
     Raises:
         ActuatedCharactersError: a name or a value is wrong, or one would act beside the action.
     """
-    for name, alone in _UNAIDED_PARAMETERS.items():
+    for name, alone in UNAIDED_PARAMETERS.items():
         if given.get(name, alone) != alone:
             raise ConfigurationError(
                 f"parameter '{name}' is {given[name]}; in an environment it must be {alone}, "
                 "because the action takes its place"
             )
-    given = {**choose_reference(given), **given, **_UNAIDED_PARAMETERS}
+    given = {**choose_reference(given), **given, **UNAIDED_PARAMETERS}
     return parameters.resolve_for(character, given)
 
 

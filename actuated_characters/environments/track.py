@@ -27,10 +27,10 @@ from actuated_characters.environments.options import (
     checked_action,
     controller_values,
     start_of,
-    with_shared,
 )
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.runs.plan import with_shared
 from controller_node.model_check import check_inertia
 from controller_node.parameters import make_controller_settings
 from controller_node.references.factory import make_motion
@@ -119,7 +119,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         check_options(duration, ticks_per_step, simulator)
         if render_mode is not None:
             check_drawing(render_mode, render_size)
-        simulator, given = with_shared(simulator, controller, reference)
+        simulator, given = with_shared(simulator, {**controller, **reference})
         self._character = placed(load_character(character, collides(simulator)), simulator)
         values = controller_values(self._character, given)
         motion = make_motion(self._character, values)
@@ -203,9 +203,7 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
                 simulation.step(effort(simulation.ticks, simulation.state))
         except SimulationError:
             return self._seen.copy(), 0.0, True, False, {**self._info(), "diverged": True}
-        reward, is_over = self._assessment.reward(
-            simulation.state, self._motion.at(simulation.ticks)
-        )
+        reward, is_over = self._assessment.reward(self._present(), self._desired(simulation.ticks))
         is_complete = simulation.ticks >= round(self._duration * simulation.rate_hz)
         return self._see(), reward, is_over, is_complete, self._info()
 
@@ -285,9 +283,17 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def _see(self) -> FloatArray:
         """The observation of the present state, which is kept; a copy of it."""
-        ahead = self._motion.at(self._simulation.ticks + self._ticks)
-        self._seen = self._assessment.observation(self._simulation.state, ahead)
+        ahead = self._desired(self._simulation.ticks + self._ticks)
+        self._seen = self._assessment.observation(self._present(), ahead)
         return self._seen.copy()
+
+    def _present(self) -> tuple[FloatArray, FloatArray]:
+        state = self._simulation.state
+        return state.position, state.velocity
+
+    def _desired(self, tick: int) -> tuple[FloatArray, FloatArray]:
+        desired = self._motion.at(tick)
+        return desired.configuration.position, desired.velocity
 
     def _info(self) -> dict[str, Any]:
         """Time in s since the episode began, and of the reference."""

@@ -3,6 +3,8 @@
 import hashlib
 from collections.abc import Iterable
 
+import numpy as np
+
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.messages.state import StampedState
 
@@ -32,6 +34,14 @@ class StateHash:
         self._hash.update(state.stamp_ns.to_bytes(8, "little", signed=True))
         self._hash.update(state.position.tobytes())
         self._hash.update(state.velocity.tobytes())
+
+    def add_rows(self, stamps_ns: IntArray, motion: FloatArray) -> None:
+        """Add states in rows: stamps (m,), and positions and velocities (m, 2, n)."""
+        size = motion.shape[2]
+        rows = np.empty((len(motion), 1 + 2 * size))
+        rows[:, 0] = stamps_ns.astype("<i8").view(float)
+        rows[:, 1:] = motion.reshape(len(motion), 2 * size)
+        self._hash.update(rows.data)
 
     def hexdigest(self) -> str:
         """The hash of all states so far, hexadecimal."""

@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.qos import QoSProfile
@@ -13,12 +14,11 @@ from actuated_characters.recorder.session_filter import Heard
 from actuated_characters.recorder.topic_reader import TopicReader
 from actuated_characters.recorder.topics import RecordedTopic, wanted_topics
 from msgs_config.bus.dds import DdsNode
-from msgs_config.bus.node import declared_settings
+from msgs_config.bus.node import StopFlag, declared_settings
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from msgs_config.messages.topic import LISTENING_DEPTH, Quality
-from msgs_config.runtime.process import StopSignal
 
 _DRAIN_PERIOD = 0.01  # s between looks at the topics: one waking up for many messages
 _LONGEST_END = 20.0  # s for the messages that are on their way at the stop
@@ -28,17 +28,24 @@ _FLUSH_PERIOD = 0.5  # s: messages that are older outlive even a kill of the rec
 _SEARCH_PERIOD = 0.2  # s between looks for the publishers of topics that are known by name alone
 
 
+def _print(line: str) -> None:
+    print(line, flush=True)
+
+
 class RecorderNode(DdsNode):
     """Subscribes to all topics and publishes nothing, so that it never delays the loop."""
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, tell: Callable[[str], object] = _print, **options: Any) -> None:
         """Open the bag and the subscriptions; `options` are rclpy's own of every node.
+
+        `tell` gets the lines about its progress.
 
         Raises:
             ActuatedCharactersError: a parameter is wrong, or the directory cannot be written to.
         """
         super().__init__(topics.RECORDER_NODE, **options)
         settings = declared_settings(self, RecorderSettings)
+        self._tell = tell
         self._progress_period = settings.progress_period
         self._readers: list[TopicReader] = []
         wanted = wanted_topics(self, settings)
@@ -52,7 +59,7 @@ class RecorderNode(DdsNode):
         self._recorder.add(recorded, offered)
         self._readers.append(TopicReader(self, recorded))
 
-    def run(self, stop: StopSignal) -> None:
+    def run(self, stop: StopFlag) -> None:
         """Record until `stop`, then take the messages on their way and write the figures.
 
         Raises:
@@ -98,13 +105,13 @@ class RecorderNode(DdsNode):
 
     def _flush(self) -> float:
         if self._recorder.flush() and self._progress_period > 0.0:
-            print(f"flushed {self._recorder.last_tick}", flush=True)
+            self._tell(f"flushed {self._recorder.last_tick}")
         return _FLUSH_PERIOD
 
     def _tell_progress(self) -> float:
         if self._progress_period == 0.0:
             return float("inf")
-        print(f"tick {self._recorder.last_tick}", flush=True)
+        self._tell(f"tick {self._recorder.last_tick}")
         return self._progress_period
 
     def _drain(self, *, gives_way: bool = True) -> int:

@@ -6,15 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from actuated_characters.recorder.run_directory import (
-    LOGS,
-)
+from actuated_characters.recorder.run_directory import LOGS, write_parameters
 from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.velocities import PlannedVelocity
 from actuated_characters.runs.planned.wrenches import PlannedPush
-from actuated_characters.runs.processes import Child, Children
+from actuated_characters.runs.processes import Child, Children, Member
 from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.senders import check_recorded, plan_senders
 from msgs_config.errors import RunError
@@ -52,10 +50,11 @@ def run_over_topics(
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
-    With `composed`, controller and simulator are one process. `recording` has parameters of the
-    recorder. Pushes, throws and velocities are sent by one more process; in lockstep all are there
-    before the first tick. With parameters of the node `fork` that process repeats a recording, with
-    so many resets. With those of a `viewer` one more shows the characters in a browser.
+    Without a bag the recorder is a thread of this process. With `composed`, controller and
+    simulator are one process. `recording` has parameters of the recorder. Pushes, throws and
+    velocities are sent by one more process; in lockstep all are there before the first tick. With
+    parameters of the node `fork` that process repeats a recording, with so many resets. With those
+    of a `viewer` one more shows the characters in a browser.
 
     Raises:
         RunError: one of the processes failed, or the simulator rejected a push or throw.
@@ -68,7 +67,7 @@ def run_over_topics(
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
-        recorder = children.start_node("recorder", {**recording, "progress_period": 0.1}, *session)
+        recorder = _start_recorder(children, recording, session, environment)
         sender = [children.start_node(name, given, *session) for name, given in senders.items()]
         # of the torques, before the first answer, or a tick would go unrecorded
         listeners = (2 + (fork is not None), 2 + len(sender))
@@ -78,6 +77,22 @@ def run_over_topics(
         raise RunError(f"recorder failed: {recorder.last_words()}")
     counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
     check_recorded(directory, plan.ticks - resets, counts)
+
+
+def _start_recorder(
+    children: Children,
+    recording: Mapping[str, object],
+    session: Sequence[str],
+    environment: Mapping[str, str],
+) -> Member:
+    """Start the recorder: a process of its own where there is a bag to be written."""
+    recording = {**recording, "progress_period": 0.1}
+    if recording["write_bag"]:
+        return children.start_node("recorder", recording, *session)
+    from actuated_characters.runs.recorder_thread import RecorderThread
+
+    file = write_parameters(children.directory, "recorder", recording)
+    return children.start_thread(lambda: RecorderThread(file, environment, session))
 
 
 def watch(viewer: Child, progress: Progress) -> Progress:
@@ -151,7 +166,7 @@ def run_environment(directory: Path) -> Iterator[dict[str, str]]:
 class _Silence:
     """Prints, once each, what the nodes say that they wait for while no tick comes."""
 
-    def __init__(self, children: Sequence[Child]) -> None:
+    def __init__(self, children: Sequence[Member]) -> None:
         self._sizes = dict.fromkeys(children, 0)  # sizes of the logs at the last tick
         self._ticks, self._since = 0, time.monotonic()
         self._printed: set[str] = set()
@@ -172,7 +187,7 @@ class _Silence:
                 print(line, flush=True)
 
 
-def wait_for_end(simulator: Child, others: list[Child], progress: Progress) -> None:
+def wait_for_end(simulator: Member, others: Sequence[Member], progress: Progress) -> None:
     """Wait until the simulator has ended well, and the others have not ended before."""
     recorder = others[-1]
     start_deadline = time.monotonic() + _START_TIMEOUT

@@ -191,6 +191,17 @@ def _shared(
     for name, option in _SET_BY_RUN.items():
         if name in simulator or name in controller:
             raise ConfigurationError(f"parameter '{name}' is set by {option}")
+    return with_shared(simulator, controller)
+
+
+def with_shared(
+    simulator: Mapping[str, object], controller: Mapping[str, object]
+) -> tuple[dict[str, object], dict[str, object]]:
+    """Both sides' parameters, with those that are the same on both sides.
+
+    Raises:
+        ConfigurationError: one of these is given with two values.
+    """
     both = {name: side[name] for side in (controller, simulator) for name in SHARED if name in side}
     for name, value in both.items():
         for side in (simulator, controller):

@@ -7,9 +7,10 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 from actuated_characters.recorder.run_directory import LOGS, PARAMETERS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
@@ -33,6 +34,32 @@ _PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent,
 _WARNING_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # rcutils' form
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 _LIBC = ctypes.CDLL(None)  # loaded before a fork, not after
+
+
+class Member(Protocol):
+    """One of those that a run is made of: a process, or a thread with the same ways."""
+
+    name: str
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code, None while it works."""
+
+    @property
+    def log_size(self) -> int:
+        """Bytes of its log so far."""
+
+    def read_lines(self) -> list[str]:
+        """What it has printed since the last call."""
+
+    def last_words(self) -> str:
+        """The reason for its end."""
+
+    def last_warning(self, since: int) -> str:
+        """The text of its last warning beyond so many bytes of its log; empty: none."""
+
+    def end(self, request: signal.Signals | None = None) -> int:
+        """End it, in good order where a signal is given; return the exit code."""
 
 
 class Child:
@@ -163,7 +190,7 @@ class Children:
         require_extra("wheels", "a node that is a process of its own")
         self.directory = directory
         self._environment = environment
-        self._children: list[Child] = []
+        self._members: list[Member] = []
         for folder in (PARAMETERS, LOGS):
             (directory / folder).mkdir(parents=True, exist_ok=True)
 
@@ -171,8 +198,8 @@ class Children:
         return self
 
     def __exit__(self, *error: object) -> None:
-        for child in reversed(self._children):
-            child.end(signal.SIGINT)
+        for member in reversed(self._members):
+            member.end(signal.SIGINT)
 
     def start_node(
         self,
@@ -188,6 +215,12 @@ class Children:
         """
         file = write_parameters(self.directory, name, parameters, "/**" if any_node else name)
         return self._start(name, [file], ros_arguments, arguments)
+
+    def start_thread(self, make: Callable[[], Member]) -> Member:
+        """Start one that is no process; a signal waits until it is one that will be ended."""
+        with signals_held():
+            self._members.append(make())
+        return self._members[-1]
 
     def start_composed(
         self, name: str, parameters: Mapping[str, Mapping[str, object]], *ros_arguments: str
@@ -217,7 +250,7 @@ class Children:
         log = self.directory / LOGS / f"{name}.log"
         with signals_held():
             child = Child(command, log, environment=self._environment)
-            self._children.append(child)
+            self._members.append(child)
         return child
 
 

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
@@ -10,6 +10,8 @@ from unittest.mock import patch
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from sim_node.physics.engine import make_world
+from sim_node.physics.settings import WorldSettings
 
 _ROUNDS = 7  # the best one counts, which others on the machine disturbed the least
 _CALLS = 2000
@@ -46,6 +48,12 @@ def timed(owner: type, method: str) -> Iterator[list[float]]:
 
     with patch.object(owner, method, timing):
         yield durations
+
+
+def timed_engine() -> AbstractContextManager[list[float]]:
+    """Durations in s of the steps of the default engine's worlds within the block, likewise."""
+    with make_world(WorldSettings()) as world:
+        return timed(type(world), "step")
 
 
 def yardstick_us() -> float:

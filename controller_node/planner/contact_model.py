@@ -13,7 +13,7 @@ import numpy as np
 
 from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.features import Watched
-from controller_node.planner.compiled.law import Joints, LawGains
+from controller_node.planner.compiled.law import Joints
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Link
@@ -24,6 +24,7 @@ from msgs_config.character.mujoco_model import (
     geometry,
     quaternion_starts,
 )
+from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.soft_limits import SoftLimits, make_soft_limits
 
@@ -62,6 +63,7 @@ class ContactModel:
             self._model.M_rowadr.astype(np.intp),
             self._model.M_rownnz.astype(np.intp),
             self._model.M_colind.astype(np.intp),
+            (self._model.M_rowadr + self._model.M_rownnz - 1).astype(np.intp),
         )
         self._joints = self._find_joints()
         self._limits = self._find_limits()

@@ -3,16 +3,19 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import rclpy
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.client import Client as RosClient
+from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
@@ -20,10 +23,25 @@ from std_srvs.srv import SetBool, Trigger
 from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters, plain_value, set_request
+from msgs_config.errors import ConfigurationError
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, Values
 
 _UNKNOWN_NODE = "_UNKNOWN_"  # ROS says this of a node whose name has not come yet
+
+
+def own_context(*arguments: str) -> Context:
+    """A context of ROS beside any other of this process, started with arguments for ROS.
+
+    Raises:
+        ConfigurationError: ROS does not start.
+    """
+    context, options = Context(), SignalHandlerOptions.NO
+    try:
+        rclpy.init(args=["--ros-args", *arguments], context=context, signal_handler_options=options)
+    except RuntimeError as error:
+        raise ConfigurationError(f"ROS does not start: {' '.join(str(error).split())}") from error
+    return context
 
 
 def create_publisher(node: Node, topic: Topic) -> "DdsPublisher":

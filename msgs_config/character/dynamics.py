@@ -11,7 +11,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
 _NONE: FloatArray = np.empty(0)
-_OF_THE_DATA = ("_qpos", "_qvel", "_mass", "view")  # attributes that a copy makes anew
+_OF_THE_DATA = ("_qpos", "_qvel", "_mass", "parts", "view")  # attributes that a copy makes anew
 
 
 class DynamicsModel:
@@ -47,7 +47,7 @@ class DynamicsModel:
 
     def _find_views(self) -> None:
         self._qpos, self._qvel, self._mass = self._data.qpos, self._data.qvel, self._data.M
-        self.view = compiled.make_view(
+        self.parts = compiled.DynamicsParts(
             self._model._address,
             self._data._address,
             self._qpos,
@@ -57,9 +57,9 @@ class DynamicsModel:
             self._identity,
             self._desired,
             self._damping,
-            self._is_damped,
         )
-        """What compiled code has of it; not to be kept longer than the model."""
+        self.view = compiled.make_view(*self.parts)
+        """What compiled code has of it; neither is to be kept longer than the model."""
 
     def update(self, position: FloatArray, velocity: FloatArray) -> None:
         """Take over a state: position (n,), message form, and velocity (n,)."""

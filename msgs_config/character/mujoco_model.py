@@ -9,7 +9,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
+from msgs_config.character.meshes.thickness import is_flat, with_thickness
 from msgs_config.character.meshes.triangles import is_converted, read_vertices
 from msgs_config.character.model import Character, Joint, Link, Shape, ShapeType
 from msgs_config.geometry import rotations
@@ -107,18 +109,32 @@ def geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:
     place: dict[str, object] = {"type": _GEOMETRIES[shape.type], "pos": shape.pose.position}
     place["quat"] = turn
     if shape.type is ShapeType.MESH:
-        mesh = spec.add_mesh(scale=shape.size)
-        if is_converted(Path(shape.mesh)):
-            mesh.uservert = read_vertices(Path(shape.mesh)).ravel()
+        file = Path(shape.mesh)
+        vertices = read_vertices(file)
+        if is_converted(file) or is_flat(vertices * shape.size):
+            mesh = add_hull(spec, vertices, shape.size)
         else:
-            mesh.file = shape.mesh
-        mesh.name = f"mesh {len(spec.meshes)}"
+            mesh = spec.add_mesh(scale=shape.size)
+            mesh.file, mesh.name = shape.mesh, f"mesh {len(spec.meshes)}"
         return {**place, "meshname": mesh.name}
     if shape.type is ShapeType.BOX:
         return {**place, "size": tuple(0.5 * edge for edge in shape.size)}
     radius, *length = shape.size
     half = 0.5 * length[0] if length else 0.0
     return {**place, "size": (radius, half, 0.0)}
+
+
+def add_hull(spec: mujoco.MjSpec, vertices: FloatArray, scale: Sequence[float]) -> mujoco.MjsMesh:
+    """Add a mesh of vertices (m, 3), scaled along its axes, of which MuJoCo takes the hull.
+
+    What is flat gets a thickness: MuJoCo finds no hull of it.
+    """
+    mesh = spec.add_mesh(name=f"mesh {len(spec.meshes) + 1}")
+    if is_flat(scaled := vertices * scale):
+        mesh.uservert = with_thickness(scaled).ravel()
+    else:
+        mesh.uservert, mesh.scale = vertices.ravel(), scale
+    return mesh
 
 
 def ancestors(character: Character, index: int) -> set[int]:

@@ -2,9 +2,13 @@
 
 import hashlib
 import os
+import shutil
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterable
-from functools import cache, partial
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -22,13 +26,16 @@ if all(get_host_cpu_features().get(name) for name in _FEATURES):
         os.environ.setdefault("NUMBA_CPU_FEATURES", "")
 
 import numba  # noqa: E402
+from numba.core import event  # noqa: E402
 
 from msgs_config.geometry import scalars  # noqa: E402
 
 _CONFIG: Any = numba.config
+_NJIT: Any = numba.njit  # its annotations differ from version to version
 _CONFIG.reload_config()  # where somebody has imported numba before
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
+_MONTH_S = 30 * 24 * 3600
 SOURCES = (*_HERE.glob("*.py"), Path(scalars.__file__))
 """All files with functions that are compiled here; a test compares."""
 
@@ -44,10 +51,15 @@ class Compiler:
         self.sources = (*SOURCES, *sources)
         self.cache = choose_cache_directory(self.sources, _CONFIG.CACHE_DIR)
         self._is_kept = _make_directory(self.cache)
+        _announcer.files.update(map(str, self.sources))
 
     def __call__(self, function: _Function) -> _Function:
         """Compile a function for the types that it is called with."""
         return self._compile(function, None)
+
+    def inlined(self, function: _Function) -> _Function:
+        """Compile a function into those that call it: large tuples are not handed over then."""
+        return self._compile(function, None, is_inlined=True)
 
     def of(self, signature: object) -> Callable[[_Function], _Function]:
         """Compile a function for these types alone, before it is called.
@@ -56,31 +68,42 @@ class Compiler:
         """
         return partial(self._compile, signature=signature)
 
-    def _compile(self, function: _Function, signature: Any) -> _Function:
+    def _compile(self, function: _Function, signature: Any, is_inlined: bool = False) -> _Function:
         given, _CONFIG.CACHE_DIR = _CONFIG.CACHE_DIR, str(self.cache)  # read as numba decorates
         try:
-            make: Any = numba.njit(
-                signature, nogil=True, cache=self._is_kept, error_model="numpy", fastmath=False
+            make = _NJIT(
+                signature,
+                nogil=True,
+                cache=self._is_kept,
+                error_model="numpy",
+                fastmath=False,
+                forceinline=is_inlined,
             )
             return cast(_Function, make(function))
         finally:
             _CONFIG.CACHE_DIR = given
 
 
-def _make_directory(directory: Path) -> bool:
-    """Make a directory for compiled functions, saying what it is for; whether it is there."""
-    if not directory.exists():
-        _say_what_takes_long()
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(directory, os.W_OK)
+class _Announcer(event.Listener):  # type: ignore[misc,unused-ignore]  # annotated in some versions
+    """Says, once, what takes so long when a function of ours is compiled."""
+
+    def __init__(self) -> None:
+        self.files: set[str] = set()
+        self._has_said = False
+
+    def on_start(self, happened: Any) -> None:
+        """Numba begins to compile a function."""
+        file = happened.data["dispatcher"].py_func.__code__.co_filename
+        if file in self.files and not self._has_said:
+            self._has_said = True
+            print("compiling what is computed often, once; it takes some seconds", file=sys.stderr)
+
+    def on_end(self, happened: Any) -> None:
+        """Numba has compiled it."""
 
 
-@cache
-def _say_what_takes_long() -> None:
-    print("compiling what is computed often, once; it takes some seconds", file=sys.stderr)
+_announcer = _Announcer()
+event.register("numba:compile", _announcer)
 
 
 def choose_cache_directory(sources: Iterable[Path], given: str = "") -> Path:
@@ -89,19 +112,50 @@ def choose_cache_directory(sources: Iterable[Path], given: str = "") -> Path:
     A function holds the code of those that it calls, and numba looks for changes in its own file
     alone: with one directory a change in another file would leave the old code in force.
 
+    numba reads no code where it cannot write. So what is kept there is copied to the user's cache.
+
     Args:
         sources: All files with functions that call each other.
-        given: Directory that NUMBA_CACHE_DIR names; empty: beside the sources, or the user's
-            cache where that cannot be written to.
+        given: Directory that NUMBA_CACHE_DIR names; empty: beside the sources.
     """
     digest = hashlib.sha256()
     for source in sorted(sources):
         digest.update(source.read_bytes())
     base = Path(given) if given else _HERE / "__pycache__"
-    if not given and not os.access(_HERE, os.W_OK):
-        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        base = Path(cache) / "actuated_characters"
-    return base / f"numba-{digest.hexdigest()[:16]}"
+    directory = base / f"numba-{digest.hexdigest()[:16]}"
+    if _can_write(directory):
+        return directory
+    users = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    copy = users / "actuated_characters" / directory.name
+    if directory.is_dir() and not copy.exists():
+        with suppress(OSError):
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=copy.parent) as folder:
+                whole = Path(shutil.copytree(directory, Path(folder) / copy.name))
+                whole.rename(copy)  # so that another process finds all of it or nothing
+    return copy
+
+
+def _can_write(directory: Path) -> bool:
+    """Whether a directory can be written to, or made."""
+    there = next(each for each in (directory, *directory.parents) if each.exists())
+    return os.access(there, os.W_OK)
+
+
+def _make_directory(directory: Path) -> bool:
+    """Make a directory for compiled functions; whether it is there.
+
+    What was compiled of other contents of the sources, and was not asked for in a month, goes.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        os.utime(directory)
+        for other in directory.parent.glob("numba-*"):
+            if other.stat().st_mtime < time.time() - _MONTH_S:
+                shutil.rmtree(other, ignore_errors=True)
+    except OSError:
+        return False
+    return os.access(directory, os.W_OK)
 
 
 compiled = Compiler()

@@ -5,17 +5,20 @@ and make the sums of `controller_node.control_laws.stable_pd_effort` entry by en
 the bits of these, which the tests compare.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numba.experimental import structref
 
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled import law
 from msgs_config.compiled import mujoco_functions as mj
 from msgs_config.compiled.decorator import compiled
+from msgs_config.compiled.mass_matrix import MassMatrix
 
 _OWN = types.Array(types.float64, 1, "C")
+_ROWS = types.Array(types.float64, 2, "C")
 GIVEN = types.Array(types.float64, 1, "A", readonly=True)
 """Any array (n,): it is copied before MuJoCo reads it, as rows that lie apart cannot be."""
 _FIELDS = (
@@ -28,7 +31,6 @@ _FIELDS = (
     ("identity", _OWN),
     ("desired", _OWN),
     ("passive_damping", _OWN),
-    ("is_damped", types.boolean),
 )
 
 
@@ -62,7 +64,6 @@ def make_view(
     identity: FloatArray,
     desired: FloatArray,
     passive_damping: FloatArray,
-    is_damped: bool,
 ) -> Any:
     """The view, made by compiled code that is kept; numba's own way compiles in each process."""
     return DynamicsView(
@@ -75,23 +76,44 @@ def make_view(
         identity,
         desired,
         passive_damping,
-        is_damped,
     )
+
+
+class DynamicsParts(NamedTuple):
+    """The same as a tuple, which has no owners where it is borrowed."""
+
+    model: int
+    data: int
+    position: FloatArray  # (q,)
+    velocity: FloatArray  # (n,)
+    mass: FloatArray  # (e,)
+    diagonal: IntArray  # (n,)
+    identity: FloatArray  # (q,)
+    desired: FloatArray  # (q,)
+    passive_damping: FloatArray  # (n,)
 
 
 @compiled
 def _convert(view: Any, position: FloatArray, out: FloatArray) -> None:
-    """Write a position (n,), message form, as MuJoCo has it (q,)."""
+    """Write a position (n,), message form, without gaps, as MuJoCo has it (q,)."""
     if len(position) != len(view.velocity):  # MuJoCo would read what is beyond its end
         raise ValueError("an array has not one entry a degree of freedom")
-    moved = position.copy()
     out[:] = view.identity
-    mj.move_position(view.model, out.ctypes.data, moved.ctypes.data, 1.0)
+    mj.move_position(view.model, out.ctypes.data, position.ctypes.data, 1.0)
 
 
-@compiled.of(types.void(VIEW, GIVEN, GIVEN))
-def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
-    """Take over a state: position (n,), message form, and velocity (n,)."""
+@compiled.of(_ROWS(VIEW, _ROWS))
+def convert_rows(view: Any, positions: FloatArray) -> FloatArray:
+    """Positions (k, n), message form, as MuJoCo has them (k, q)."""
+    rows = np.empty((len(positions), len(view.position)))
+    for k in range(len(positions)):
+        _convert(view, positions[k], rows[k])
+    return rows
+
+
+@compiled
+def enter_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
+    """Take over a state: position (n,), message form, and velocity (n,), without gaps."""
     _convert(view, position, view.position)
     view.velocity[:] = velocity
     mj.find_frames(view.model, view.data)
@@ -100,67 +122,43 @@ def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
     mj.find_velocities(view.model, view.data)
 
 
+@compiled.of(types.void(VIEW, GIVEN, GIVEN))
+def take_state(view: Any, position: FloatArray, velocity: FloatArray) -> None:
+    """Take over a state: position (n,), message form, and velocity (n,)."""
+    enter_state(view, position.copy(), velocity)
+
+
 @compiled
-def _known_effort(
+def add_effort(
+    effort: FloatArray,
     view: Any,
+    error: FloatArray,
     velocity: FloatArray,
-    desired: FloatArray,
     desired_velocity: FloatArray,
     stiffness: FloatArray,
     damping: FloatArray,
-    offset: FloatArray,
-    feedforward: FloatArray,
     period: float,
-) -> FloatArray:
-    """The effort (n,) without what follows of the acceleration."""
-    error = np.empty(len(velocity))
-    _convert(view, desired, view.desired)
-    start, end = view.position.ctypes.data, view.desired.ctypes.data
-    mj.find_difference(view.model, error.ctypes.data, 1.0, start, end)
-    if len(offset):
-        error += offset
-    known = np.empty(len(velocity))
-    for i in range(len(velocity)):
-        known[i] = (
-            (feedforward[i] if len(feedforward) else 0.0)
-            + stiffness[i] * (error[i] - period * velocity[i])
-            + damping[i] * (desired_velocity[i] - velocity[i])
-        )
-    return known
+    bias: FloatArray,
+    acceleration: FloatArray,
+) -> None:
+    """Add stable PD against errors (n,) to a feedforward or zero (n,), in the state taken over.
 
-
-@compiled
-def _without_bias(view: Any, known: FloatArray, velocity: FloatArray) -> FloatArray:
-    """A force (n,) less Coriolis', centrifugal, gravity's, and passive damping's."""
-    bias = np.zeros(len(known))
+    Bias and acceleration are room (n,).
+    """
+    law.add_known(effort, error, velocity, desired_velocity, stiffness, damping, period)
+    bias[:] = 0.0
     mj.find_bias_force(view.model, view.data, 0, bias.ctypes.data)
-    if view.is_damped:
-        for i in range(len(bias)):
-            bias[i] += view.passive_damping[i] * velocity[i]
-    return known - bias
-
-
-@compiled
-def _minus_implicit(
-    view: Any, known: FloatArray, force: FloatArray, damping: FloatArray, period: float
-) -> FloatArray:
-    """The effort (n,): what is known, less what the acceleration by a force (n,) takes."""
-    implicit, without = damping * period, np.empty(len(known))
-    for i in range(len(known)):
-        added = implicit[i]
-        if view.is_damped:
-            added = period * view.passive_damping[i] + added
-        without[i] = view.mass[view.diagonal[i]]
-        view.mass[view.diagonal[i]] = without[i] + added
-    mj.factorise_mass(view.model, view.data)
-    for i in range(len(known)):
-        view.mass[view.diagonal[i]] = without[i]
-    acceleration = np.empty(len(known))
-    mj.solve_mass(view.model, view.data, acceleration.ctypes.data, force.ctypes.data, 1)
-    effort = np.empty(len(known))
-    for i in range(len(known)):
-        effort[i] = known[i] - implicit[i] * acceleration[i]
-    return effort
+    law.subtract_implicit(
+        effort,
+        bias,
+        velocity,
+        damping,
+        view.passive_damping,
+        period,
+        MassMatrix(view.model, view.data, view.mass),
+        view.diagonal,
+        acceleration,
+    )
 
 
 @compiled.of(_OWN(VIEW, *(8 * [GIVEN]), types.float64))
@@ -191,8 +189,25 @@ def stable_pd(
         period: s.
     """
     take_state(view, position, velocity)
-    known = _known_effort(
-        view, velocity, desired, desired_velocity, stiffness, damping, offset, feedforward, period
+    effort, error = np.zeros(len(velocity)), np.empty(len(velocity))
+    if len(feedforward):
+        effort += feedforward
+    _convert(view, desired.copy(), view.desired)
+    start, end = view.position.ctypes.data, view.desired.ctypes.data
+    mj.find_difference(view.model, error.ctypes.data, 1.0, start, end)
+    if len(offset):
+        error += offset
+    bias, acceleration = np.empty(len(velocity)), np.empty(len(velocity))
+    add_effort(
+        effort,
+        view,
+        error,
+        velocity,
+        desired_velocity,
+        stiffness,
+        damping,
+        period,
+        bias,
+        acceleration,
     )
-    force = _without_bias(view, known, velocity)
-    return _minus_implicit(view, known, force, damping, period)
+    return effort

@@ -17,6 +17,7 @@ class Tree(NamedTuple):
     starts: IntArray  # (n,) where each row begins among the entries
     lengths: IntArray  # (n,) number of entries in each row
     columns: IntArray  # (e,) the column of each entry
+    diagonal: IntArray  # (n,) where the diagonal is among the entries
 
 
 class MassMatrix(NamedTuple):

@@ -1,5 +1,7 @@
 """Positions and velocities in message form, of those that MuJoCo has."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import types
 
@@ -12,6 +14,32 @@ _PLACES = types.Array(types.intp, 1, "C")
 _BOTH = types.Array(types.float64, 2, "C")
 
 
+class Places(NamedTuple):
+    """Where MuJoCo's positions are in those of the message form."""
+
+    quaternions: IntArray  # (k,) where each begins in MuJoCo's
+    vectors: IntArray  # (k,) where their rotation vectors begin
+    numbers: IntArray  # (m,) the other numbers in MuJoCo's
+    entries: IntArray  # (m,) where they are
+
+
+@compiled
+def write_motion(
+    both: FloatArray, position: FloatArray, velocity: FloatArray, places: Places
+) -> None:
+    """Write position and velocity (2, n), of MuJoCo's position (q,) and velocity (n,).
+
+    Rotation vectors are in rad.
+    """
+    for k in range(len(places.quaternions)):
+        start = places.vectors[k]
+        x, y, z = rotation_vector(quaternion(position, places.quaternions[k]))
+        both[0, start], both[0, start + 1], both[0, start + 2] = x, y, z
+    for k in range(len(places.numbers)):
+        both[0, places.entries[k]] = position[places.numbers[k]]
+    both[1, :] = velocity
+
+
 @compiled.of(_BOTH(_NUMBERS, _NUMBERS, _PLACES, _PLACES, _PLACES, _PLACES))
 def read_motion(
     position: FloatArray,
@@ -21,17 +49,7 @@ def read_motion(
     numbers: IntArray,
     entries: IntArray,
 ) -> FloatArray:
-    """Position and velocity (2, n), of MuJoCo's position (q,) and velocity (n,).
-
-    Quaternions (k,) begin at these places of the position, and their rotation vectors (k,) at these
-    of a position in message form, rad; the other numbers (m,) are at the entries (m,).
-    """
+    """Position and velocity (2, n): see `write_motion`; the last four are those of `Places`."""
     both = np.empty((2, len(velocity)))
-    for k in range(len(quaternions)):
-        start = vectors[k]
-        x, y, z = rotation_vector(quaternion(position, quaternions[k]))
-        both[0, start], both[0, start + 1], both[0, start + 2] = x, y, z
-    for k in range(len(numbers)):
-        both[0, entries[k]] = position[numbers[k]]
-    both[1, :] = velocity
+    write_motion(both, position, velocity, Places(quaternions, vectors, numbers, entries))
     return both

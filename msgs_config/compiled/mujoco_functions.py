@@ -60,3 +60,28 @@ find_difference = _function(
     "mj_differentiatePos", _ADDRESS, _ADDRESS, types.float64, _ADDRESS, _ADDRESS
 )
 """`(model, velocity, seconds, start, end)`: the velocity (n,) that leads from one to another."""
+
+find_position_terms = _of_model_and_data("mj_fwdPosition")
+"""`(model, data)`: the first part of `mj_step1`: frames, mass matrix, contacts."""
+
+find_velocity_terms = _of_model_and_data("mj_fwdVelocity")
+"""`(model, data)`: the part after it, that depends on the velocity, too."""
+
+find_free_acceleration = _of_model_and_data("mj_fwdAcceleration")
+"""`(model, data)`: the acceleration without constraints, by the forces that were set."""
+
+solve_constraints = _of_model_and_data("mj_fwdConstraint")
+"""`(model, data)`: the constraints' forces, and the acceleration with them."""
+
+advance_explicitly = _of_model_and_data("mj_Euler")
+"""`(model, data)`: position and velocity at the end of the step."""
+
+apply_wrench = _function(
+    "mj_applyFT",
+    *(_ADDRESS, _ADDRESS, _ADDRESS, _ADDRESS, _ADDRESS),
+    *(_NUMBER, _ADDRESS),
+)
+"""`(model, data, force, torque, point, body, out)`: add a wrench's generalised force to `out`."""
+
+find_contact_force = _function("mj_contactForce", _ADDRESS, _ADDRESS, _NUMBER, _ADDRESS)
+"""`(model, data, contact, wrench)`: the force and torque (6,) of a contact, in its own frame."""

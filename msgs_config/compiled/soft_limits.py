@@ -251,6 +251,21 @@ def find_forces(count: int, mass: MassMatrix, room: PassedBounds) -> None:
 
 
 @compiled
+def find_effort(effort: FloatArray, count: int, mass: MassMatrix, room: PassedBounds) -> None:
+    """Find the effort (n,) of so many bounds that were passed, N m.
+
+    `mass` is the mass matrix in the state, which is factorised here.
+    """
+    mass_matrix.factorise(mass)
+    find_forces(count, mass, room)
+    for entry in range(len(effort)):
+        pushed = 0.0
+        for bound in range(count):
+            pushed += room.rows[bound, entry] * max(room.forces[bound], 0.0)
+        effort[entry] = 0.0 - pushed
+
+
+@compiled
 def _couple(count: int, mass: MassMatrix, room: PassedBounds) -> None:
     """Work out how the bounds' forces take from each other: the implicit share times A."""
     for j in range(count):

@@ -16,6 +16,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.messages.throw import ProjectileThrow
 
 if TYPE_CHECKING:
+    from sim_node.physics.batch import Batch, BatchSetup
     from sim_node.physics.settings import WorldSettings
 
 UNLIMITED_SPEED = 1e9
@@ -69,6 +70,8 @@ class Body(Protocol):
         It is the force in N, and the torque in N m about the link's centre of mass when the step
         began. A contact between two links of the body counts on both, in opposite directions. To be
         asked for before `link_frames` and `centres`: those move the links to where they are now.
+        Nothing touches before the first step, nor from `World.from_bytes` to the next step: a state
+        does not say what led to it.
         """
 
     def gaps(self, ball: int) -> FloatArray:
@@ -154,6 +157,7 @@ class World(Protocol):
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`.
 
         To be called right after a step: an effort that was applied but not stepped yet may stay.
+        Contacts are none until the next step.
         """
 
 
@@ -163,6 +167,8 @@ class Engine:
 
     package: str  # Python's name of what it takes
     make_world: Callable[["WorldSettings"], World]
+    # What simulates many worlds, of a setup, their number and that of threads; None: it cannot.
+    make_batch: Callable[["BatchSetup", int, int], "Batch"] | None = None
 
 
 def _make_bullet_world(settings: "WorldSettings") -> World:
@@ -177,14 +183,21 @@ def _make_mujoco_world(settings: "WorldSettings") -> World:
     return MujocoWorld(settings)
 
 
+def _make_mujoco_batch(setup: "BatchSetup", count: int, threads: int) -> "Batch":
+    from sim_node.physics.mujoco.batch import MujocoBatch
+
+    return MujocoBatch(setup, count, threads)
+
+
 ENGINES = {
     "bullet": Engine("pybullet", _make_bullet_world),
-    "mujoco": Engine("mujoco", _make_mujoco_world),
+    "mujoco": Engine("mujoco", _make_mujoco_world, _make_mujoco_batch),
 }
 """By name, the preferred one first."""
 
-DEFAULT_ENGINE = next(name for name, engine in ENGINES.items() if find_spec(engine.package))
-"""The first engine that is installed."""
+INSTALLED_ENGINES = tuple(name for name, engine in ENGINES.items() if find_spec(engine.package))
+
+DEFAULT_ENGINE = INSTALLED_ENGINES[0]
 
 
 def describe_default_engine(engine: str) -> tuple[str, ...]:
@@ -209,3 +222,19 @@ def make_world(settings: "WorldSettings") -> World:
             f"install it, or take {DEFAULT_ENGINE}"
         )
     return engine.make_world(settings)
+
+
+def make_batch(setup: "BatchSetup", count: int, threads: int) -> "Batch":
+    """Many worlds of one character each, simulated by threads.
+
+    Raises:
+        ConfigurationError: the engine cannot, or the character's joints are not of those it can.
+        CharacterError: the engine refuses the character or the terrain.
+    """
+    engine = setup.settings.world.engine
+    if (make := ENGINES[engine].make_batch) is None:
+        able = ", ".join(name for name, each in ENGINES.items() if each.make_batch is not None)
+        raise ConfigurationError(
+            f"parameter 'engine' is {engine}, which simulates no batch; it must be {able}"
+        )
+    return make(setup, count, threads)

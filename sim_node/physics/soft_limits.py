@@ -14,11 +14,10 @@ from msgs_config.character.model import Character
 from msgs_config.compiled.decorator import Compiler
 from msgs_config.compiled.dynamics import GIVEN, VIEW
 from msgs_config.compiled.mass_matrix import MassMatrix
-from msgs_config.compiled.mujoco_functions import factorise_mass
 from msgs_config.compiled.soft_limits import (
     PassedBounds,
     SoftLimits,
-    find_forces,
+    find_effort,
     find_passed,
     make_soft_limits,
     room_for_bounds,
@@ -45,19 +44,21 @@ structref.define_proxy(_Limits, _LimitsType, [name for name, _ in _FIELDS])
 _LIMITS = _LimitsType(_FIELDS)
 
 
+def limits_and_room(character: Character) -> tuple[SoftLimits, PassedBounds]:
+    """A character's soft limits, in message form, and room for all that may be passed at once."""
+    limited = [joint for joint in character.moving_joints if joint.soft_limit is not None]
+    limits = [joint.soft_limit for joint in limited if joint.soft_limit is not None]
+    starts = [character.layout.joint(joint.name).start for joint in limited]
+    room = room_for_bounds(3 * len(limits), character.layout.size)
+    return make_soft_limits(limits, starts, starts), room
+
+
 class SoftLimitForces:
     """What the soft limits do in an engine's step, if there are any."""
 
     def __init__(self, character: Character, step_s: float) -> None:
         """For engine steps of `step_s`."""
-        limited = [joint for joint in character.moving_joints if joint.soft_limit is not None]
-        limits = [joint.soft_limit for joint in limited if joint.soft_limit is not None]
-        starts = [character.layout.joint(joint.name).start for joint in limited]
-        self._limits = _make_limits(
-            step_s,
-            make_soft_limits(limits, starts, starts),
-            room_for_bounds(3 * len(limits), character.layout.size),
-        )
+        self._limits = _make_limits(step_s, *limits_and_room(character))
         self._passed = 0
 
     def find(self, position: FloatArray, velocity: FloatArray) -> bool:
@@ -83,12 +84,6 @@ def _find(held: Any, position: FloatArray, velocity: FloatArray) -> int:
 
 @_compiled.of(types.Array(types.float64, 1, "C")(_LIMITS, types.intp, VIEW))
 def _effort(held: Any, count: int, view: Any) -> FloatArray:
-    room, effort = held.room, np.zeros(len(view.velocity))
-    factorise_mass(view.model, view.data)
-    find_forces(count, MassMatrix(view.model, view.data, view.mass), room)
-    for entry in range(len(effort)):
-        pushed = 0.0
-        for bound in range(count):
-            pushed += room.rows[bound, entry] * max(room.forces[bound], 0.0)
-        effort[entry] -= pushed
+    effort = np.empty(len(view.velocity))
+    find_effort(effort, count, MassMatrix(view.model, view.data, view.mass), held.room)
     return effort

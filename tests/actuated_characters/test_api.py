@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pybullet
 import pytest
 
 import actuated_characters as ac
@@ -18,6 +17,7 @@ from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import parse_push
 from msgs_config.bus.ros_state import read_state
+from tests.support.engines import open_worlds
 from tests.support.ros import Processes
 
 ROOT = Path(__file__).parents[2]
@@ -122,21 +122,15 @@ def test_a_reset_is_a_fresh_world(pendulum: ac.Character, world: ac.Simulation) 
 
 
 def test_a_world_that_is_left_or_closed_has_no_engine(pendulum: ac.Character) -> None:
-    before = engines()
+    before = open_worlds()
 
     with ac.Simulation(pendulum):
-        assert engines() == before + 1
-    assert engines() == before
+        assert open_worlds() == before + 1
+    assert open_worlds() == before
     other = ac.Simulation(pendulum)
     other.close()
 
-    assert engines() == before
-
-
-def engines() -> int:
-    """How many of PyBullet's engines there are in this process."""
-    connections = (pybullet.getConnectionInfo(client) for client in range(64))
-    return sum(connection["isConnected"] for connection in connections)
+    assert open_worlds() == before
 
 
 def test_parameters_act_on_both_sides(pendulum: ac.Character) -> None:

@@ -7,13 +7,12 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-import pybullet
 import pytest
 
 import actuated_characters as ac
 from msgs_config.errors import CharacterError, ClosedError
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.bullet.client import Engine
+from tests.support.engines import Engine, open_worlds, pybullet
 from tests.support.physics import character as shared_character
 from tests.support.urdf import inertial, joint, link, robot
 
@@ -37,16 +36,10 @@ def closed(pendulum: ac.Character) -> ac.Simulation:
 @pytest.fixture(autouse=True)
 def no_engine_is_left() -> Iterator[None]:
     gc.collect()
-    before = engines()
+    before = open_worlds()
     yield
     gc.collect()
-    assert engines() == before
-
-
-def engines() -> int:
-    """How many of PyBullet's engines there are in this process."""
-    connections = (pybullet.getConnectionInfo(client) for client in range(64))
-    return sum(connection["isConnected"] for connection in connections)
+    assert open_worlds() == before
 
 
 def ten_steps(character: ac.Character, meanwhile: Callable[[], object] | None = None) -> str:
@@ -127,14 +120,14 @@ def test_it_may_be_closed_by_another_thread(pendulum: ac.Character) -> None:
 
 
 def test_one_that_is_forgotten_is_closed(pendulum: ac.Character) -> None:
-    before = engines()
+    before = open_worlds()
     simulation = ac.Simulation(pendulum)
-    assert engines() == before + 1
+    assert open_worlds() == before + 1
     alone = ten_steps(pendulum)
     state = simulation.state
     del simulation
     gc.collect()
-    assert engines() == before
+    assert open_worlds() == before
     assert state.effort is None
     assert ten_steps(pendulum) == alone
 
@@ -146,15 +139,15 @@ def test_a_world_that_cannot_be_built_leaves_no_engine(tmp_path: Path) -> None:
     parts = (link("world", ""), joint("hinge", "world", "arm"), link("arm", inertial() + shape))
     (tmp_path / "robot.urdf").write_text(robot(*parts))
     character = ac.load_character(str(tmp_path / "robot.urdf"))
-    before = engines()
+    before = open_worlds()
     simulation = ac.Simulation(character)
     mesh.unlink()
     with pytest.raises(CharacterError, match=r"box\.obj"):
         ac.Simulation(character)
-    assert engines() == before + 1
+    assert open_worlds() == before + 1
     with pytest.raises(CharacterError, match=r"box\.obj"):
         simulation.reset()
-    assert engines() == before
+    assert open_worlds() == before
     with pytest.raises(ClosedError, match="closed"):
         simulation.step([0.0])
     simulation.close()
@@ -163,11 +156,11 @@ def test_a_world_that_cannot_be_built_leaves_no_engine(tmp_path: Path) -> None:
 def test_a_terrain_that_cannot_be_loaded_leaves_no_engine(
     pendulum: ac.Character, tmp_path: Path
 ) -> None:
-    before = engines()
+    before = open_worlds()
     (tmp_path / "ground.urdf").write_text("<robot/>")
     with pytest.raises(ac.ActuatedCharactersError) as caught:
         ac.Simulation(pendulum, terrain=str(tmp_path / "ground.urdf"))
-    assert engines() == before
+    assert open_worlds() == before
     assert "ground.urdf" in str(caught.value)
 
 

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from sim_node.physics.engine import INSTALLED_ENGINES
+from tests.support import engines
 from tests.support.locales import compile_decimal_comma
 from tests.support.programs import output_of, run_program
 from tests.support.urdf import inertial, joint, link, robot
@@ -175,6 +177,7 @@ assert alone == together
 """
 
 
+@engines.needs_bullet
 def test_worlds_of_other_settings_in_threads_are_as_alone() -> None:
     output_of(WORLDS_IN_THREADS)
 
@@ -272,5 +275,6 @@ def test_commands_run_where_there_is_no_output(closed: str, tmp_path: Path) -> N
     assert (tmp_path / "run" / "summary.json").stat().st_size > 0
 
 
-def test_the_import_of_the_engine_says_nothing() -> None:
-    assert output_of("import sim_node.physics.bullet.client") == ""
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
+def test_the_import_of_an_engine_says_nothing(engine: str) -> None:
+    assert output_of(f"import sim_node.physics.{engine}.world") == ""

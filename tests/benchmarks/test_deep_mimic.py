@@ -7,9 +7,12 @@ import numpy as np
 
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
-from benchmarks.support.deep_mimic import _LARGEST_EFFORTS, DeepMimicStablePd
 from controller_node.parameters import make_controller
 from msgs_config.character.layout import JointType
+from tests.support.engines import need_engine
+
+need_engine("bullet")
+from benchmarks.support.deep_mimic import _LARGEST_EFFORTS, DeepMimicStablePd  # noqa: E402
 
 WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
 

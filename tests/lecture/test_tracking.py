@@ -22,8 +22,8 @@ from lecture.framework.tracking import (
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.settings import WorldSettings
+from tests.support.engines import pybullet
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import LoneWorld, character
 

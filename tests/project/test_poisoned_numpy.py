@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim_node.physics.engine import INSTALLED_ENGINES
 from tests.support import golden
 
 pytestmark = [
@@ -49,7 +50,7 @@ assert np.linalg.norm(np.ones(1)) != 1.0
 """
 
 
-@pytest.mark.parametrize("engine", golden.WORLDS)
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 @pytest.mark.parametrize("name", OF_EVERY_KIND)
 def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_path: Path) -> None:
     arguments = golden.arguments_of(name, engine)
@@ -59,7 +60,7 @@ def test_no_kernel_that_is_numpys_choice_takes_part(name: str, engine: str, tmp_
     assert summary["state_hash"] == TABLE[name][engine]["state_hash"]
 
 
-@pytest.mark.parametrize("engine", golden.WORLDS)
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 @pytest.mark.parametrize(
     "environment",
     [

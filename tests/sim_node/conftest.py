@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 import pytest
 from rclpy.context import Context
 
-from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
+from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES, INSTALLED_ENGINES
+from tests.support.engines import need_engine
 from tests.support.ros import SimulatorClient
 
 Join = Callable[..., SimulatorClient]
@@ -25,8 +26,9 @@ def join(context: Context) -> Iterator[Join]:
         client.close()
 
 
-@pytest.fixture(params=ENGINES)
+@pytest.fixture(params=INSTALLED_ENGINES)
 def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     """Each engine in turn, which all worlds of the test are simulated by unless it says which."""
+    need_engine(request.param)
     monkeypatch.setitem(ENGINES, DEFAULT_ENGINE, ENGINES[request.param])
     return str(request.param)

@@ -15,6 +15,7 @@ from msgs_config.character.model import Character
 from msgs_config.messages import topics
 from sim_node.parameters import PARAMETERS, character_parameters
 from tests.sim_node.conftest import Join
+from tests.support import golden
 from tests.support.ros import Processes, SimulatorClient, joint_state, stamp_ns, tick_of, wait_until
 
 TICK_NS = 10**9 // 240
@@ -80,7 +81,7 @@ def test_the_configuration_holds_all_that_a_run_depends_on(
     assert content["parameters"]["initial_position"] == [0.25]
     assert content["parameters"]["initial_velocity"] == [0.0]
     assert content["parameters"]["gravity"] == 1.62
-    for package in ("python", "pybullet", "mujoco-core", "numpy", "actuated_characters"):
+    for package in ("python", *golden.engines(), "numpy", "actuated_characters"):
         assert re.match(r"\d+\.\d+", content["versions"][package])
 
 

@@ -12,10 +12,10 @@ from msgs_config import files
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.messages import configuration
 from sim_node.parameters import load_parameters
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
+from tests.support.engines import pybullet
 from tests.support.physics import DATA
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-import pybullet
 
 from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.scenes.scene import SIMULATOR, Scene
@@ -20,6 +19,7 @@ from sim_node.parameters import load_parameters
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.simulation import Simulation
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
+from tests.support.engines import pybullet
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from msgs_config.character.loading import load_character
 from msgs_config.geometry import rotations
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
-from sim_node.physics.bullet.client import Engine, pybullet
 from tests.support.description import origin_matrix, parse
+from tests.support.engines import Engine, pybullet
 from tests.support.ros import SimulatorClient
 from tests.support.transforms import TF2, Frames, environment_with_tf2
 

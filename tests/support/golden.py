@@ -18,17 +18,17 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from actuated_characters.commands.run import add_run, planned_run
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.in_process import run_in_process
+from sim_node.physics.engine import INSTALLED_ENGINES
 
 FILE = Path(__file__).parents[1] / "data" / "state_hashes.json"
 ENGINES = ("pybullet", "mujoco-core")
-WORLDS = ("bullet", "mujoco")
-"""The engines of the world."""
 _KEPT = ("state_hash", "ticks", "joint_error_mean_rad", "root_error_mean_m", "fell")
 _THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -54,7 +54,8 @@ def golden() -> dict[str, Any]:
 
 def engines() -> dict[str, str]:
     """Versions of what the states are worked out by, as they are installed."""
-    return {name: version(name) for name in ENGINES}
+    installed = [name for name in ENGINES if find_spec(name.removesuffix("-core"))]
+    return {name: version(name) for name in installed}
 
 
 def made_with() -> dict[str, str]:
@@ -153,11 +154,19 @@ def _summary_in(folder: Path) -> dict[str, Any]:
 
 
 def renew(names: Sequence[str]) -> None:
-    """Run the runs named, or all, and write the file; prints what is new."""
+    """Run the runs named, or all, and write the file; prints what is new.
+
+    What an engine makes of them that is not installed stays.
+    """
     content = golden()
     runs, chosen = content["runs"], list(names) or list(content["runs"])
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as workers:
-        made = [(name, engine) for name in chosen for engine in WORLDS if engine in runs[name]]
+        made = [
+            (name, engine)
+            for name in chosen
+            for engine in INSTALLED_ENGINES
+            if engine in runs[name]
+        ]
         summaries = workers.map(
             lambda run: summary_apart(arguments_of(*run), Path(folder) / "-".join(run)), made
         )
@@ -165,7 +174,7 @@ def renew(names: Sequence[str]) -> None:
             old = runs[name].get(engine, {})
             runs[name][engine] = {key: summary[key] for key in _KEPT}
             print(_told(f"{name}, {engine}", old, runs[name][engine]), flush=True)
-    content["made_with"] = made_with()
+    content["made_with"] |= made_with()
     FILE.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
+from tests.support.engines import Engine, load_urdf, pybullet
 
 
 def depths(character: Character, motion: GeneralizedPosition) -> dict[str, NDArray[np.float64]]:

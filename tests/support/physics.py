@@ -25,7 +25,6 @@ from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedReference, StampedState
 from msgs_config.messages.wrenches import WrenchArrays, select
 from sim_node import parameters as for_simulator
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.engine import Body, make_world
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.settings import SimulationSettings, WorldSettings
@@ -37,6 +36,7 @@ from sim_node.simulation_factory import (
     make_simulation,
     make_simulation_settings,
 )
+from tests.support.engines import pybullet
 
 DATA = Path(__file__).parents[1] / "data"
 TURNED_FRAMES = [str(path) for path in sorted(DATA.glob("turned_frames*.yaml"))]

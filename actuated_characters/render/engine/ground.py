@@ -141,7 +141,9 @@ def _share_of_light(view: CameraPose, size: Size, rows: FloatArray, columns: Flo
         middle = (middles[axis] / tile).astype(np.float32)
         along = 2.0 * np.abs((ends[axis] / tile).astype(np.float32) - middle)
         across = view.pixel(size[1]) / tile * abs(float(right[axis])) * depth
-        width = np.maximum(along + across[:, np.newaxis].astype(np.float32), _LEAST_FOOTPRINT)
+        width: Samples = np.maximum(
+            along + across[:, np.newaxis].astype(np.float32), _LEAST_FOOTPRINT
+        )
         product *= (_triangle_wave(middle + 0.5 * width) - _triangle_wave(middle - 0.5 * width)) / (
             width
         )

@@ -1,14 +1,14 @@
-"""Stable PD (`controller_node.control_laws.stable_pd_effort`) in compiled code, within its limits.
+"""Stable PD in the world that is looked ahead in, by that world's own mass matrix and bias.
 
-The same equation as the controller's: what is foreseen is what the controller will do.
+It is the controller's own equation (`msgs_config.compiled.law`), within its limits: what is
+foreseen is what the controller will do.
 """
 
-import math
 from typing import NamedTuple
 
 from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.compiled import mass_matrix
+from msgs_config.compiled.law import LawGains, add_known, clip, subtract_implicit
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.rotations import quaternion, turn_between
 
@@ -22,24 +22,11 @@ class Joints(NamedTuple):
     scalar_velocities: IntArray  # (h,)
 
 
-class LawGains(NamedTuple):
-    """Gains and limits of the law; the root's are zero."""
-
-    period: float  # s, of control and of simulation
-    stiffness: FloatArray  # (n,)
-    damping: FloatArray  # (n,)
-    passive_damping: FloatArray  # (n,) of the joints themselves
-    limits: FloatArray  # (b,) of each physical vector's norm, N m or N
-    vector_starts: IntArray  # (b,)
-    vector_lengths: IntArray  # (b,)
-
-
 class Room(NamedTuple):
     """Room for what the law works out."""
 
     error: FloatArray  # (n,)
-    known: FloatArray  # (n,)
-    force: FloatArray  # (n,)
+    bias: FloatArray  # (n,)
     acceleration: FloatArray  # (n,)
     implicit: MassMatrix  # mass matrix with the law's damping over a period
 
@@ -77,36 +64,23 @@ def stable_pd(
         bias: Coriolis, centrifugal and gravity (n,), without the joints' passive damping.
         mass: Entries (e,) of the mass matrix.
         tree: Where they are.
-        law: Gains and limits.
+        law: Gains and limits; the root's gains are zero.
         room: The errors (n,), and room for the rest.
     """
-    period, matrix = law.period, room.implicit
+    matrix, bias_room = room.implicit, room.bias
     matrix.entries[:] = mass
-    for i in range(len(velocity)):
-        stiffness, damping = law.stiffness[i], law.damping[i]
-        room.known[i] = stiffness * (room.error[i] - period * velocity[i]) + damping * (
-            target_velocity[i] - velocity[i]
-        )
-        room.force[i] = room.known[i] - (bias[i] + law.passive_damping[i] * velocity[i])
-        diagonal = tree.starts[i] + tree.lengths[i] - 1
-        matrix.entries[diagonal] += period * (law.passive_damping[i] + damping)
-    mass_matrix.factorise(matrix)
-    mass_matrix.solve(matrix, room.force, room.acceleration)
-    for i in range(len(velocity)):
-        effort[i] = room.known[i] - law.damping[i] * period * room.acceleration[i]
-    _clip(effort, law)
-
-
-@compiled
-def _clip(effort: FloatArray, law: LawGains) -> None:
-    """Shorten each physical vector to its limit."""
-    for vector in range(len(law.limits)):
-        first = law.vector_starts[vector]
-        last = first + law.vector_lengths[vector]
-        square = 0.0
-        for i in range(first, last):
-            square += effort[i] * effort[i]
-        norm = math.sqrt(square)
-        if norm > law.limits[vector]:
-            for i in range(first, last):
-                effort[i] *= law.limits[vector] / norm
+    bias_room[:] = bias
+    effort[:] = 0.0
+    add_known(effort, room.error, velocity, target_velocity, law.stiffness, law.damping, law.period)
+    subtract_implicit(
+        effort,
+        bias_room,
+        velocity,
+        law.damping,
+        law.passive_damping,
+        law.period,
+        matrix,
+        tree.diagonal,
+        room.acceleration,
+    )
+    clip(effort, law.limits, law.vector_starts, law.vector_lengths)

@@ -7,9 +7,11 @@ import numpy as np
 
 from controller_node.planner.compiled.decorator import compiled
 from controller_node.planner.compiled.features import Watched, write_features
-from controller_node.planner.compiled.law import Joints, LawGains, Room, add_errors, stable_pd
+from controller_node.planner.compiled.law import Joints, Room, add_errors, stable_pd
 from controller_node.references.offsets import knot_before
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled.borrowed import borrow
+from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.mujoco_functions import step_after_forces, step_before_forces
 from msgs_config.compiled.soft_limits import (
@@ -84,8 +86,10 @@ def roll_out(
         body: The character.
         engine: What simulates it.
     """
+    desired, body, engine = borrow(desired), borrow(body), borrow(engine)
+    features, knots = borrow(features), borrow(knots)
     n = len(start_velocity)
-    room = Room(np.empty(n), np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
+    room = Room(np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
     bounds = _room_for_bounds(_MOST_BOUNDS, n)
     _begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1

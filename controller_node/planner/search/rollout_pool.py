@@ -3,9 +3,6 @@
 Each depends on its own plan alone, so that neither their number nor their order matters.
 """
 
-import itertools
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 
 from controller_node.planner.compiled.rollout import (
@@ -18,6 +15,7 @@ from controller_node.planner.compiled.rollout import (
 from controller_node.planner.contact_model import ContactModel
 from controller_node.references.offsets import Offsets, knot_before
 from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.runtime.worker_threads import WorkerThreads
 
 _MAX_FEATURE = 1e4  # the largest feature; beyond it a rollout has come to nothing
 
@@ -29,8 +27,7 @@ class RolloutPool:
         """The thread that asks is one of the workers."""
         self._model = model
         self._own = model.engine()  # the engine of single states, in the thread that asks for them
-        self._engines = [model.engine() for _ in range(workers)]
-        self._threads = ThreadPoolExecutor(max(workers - 1, 1))
+        self._threads = WorkerThreads([model.engine() for _ in range(workers)])
 
     def features_of(
         self, position: FloatArray, velocity: FloatArray, body: RolloutModel
@@ -73,19 +70,13 @@ class RolloutPool:
         checks = ticks // desired.check_ticks
         features = np.zeros((len(plans), checks, self._model.feature_count))
         sound = np.zeros(len(plans), dtype=np.bool_)
-        numbers = itertools.count()  # each worker takes the next plan
 
-        def work(engine: EngineBuffers) -> None:
-            while (number := next(numbers)) < len(plans):
-                sound[number] = roll_out(
-                    features[number], position, velocity, plans[number], desired, body, engine
-                )
+        def work(engine: EngineBuffers, number: int) -> None:
+            sound[number] = roll_out(
+                features[number], position, velocity, plans[number], desired, body, engine
+            )
 
-        own, *others = self._engines
-        futures = [self._threads.submit(work, engine) for engine in others]
-        work(own)
-        for done in futures:
-            done.result()
+        self._threads.share(len(plans), work)
         with np.errstate(invalid="ignore"):
             sound &= (np.abs(features) < _MAX_FEATURE).all(axis=(1, 2))  # NaN is not sound
         features[~sound] = 0.0

@@ -169,7 +169,7 @@ class BulletWorld:
 
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""
-        self._touched = None
+        self._touched = {}  # the engine would restore the saved state's contacts, too
         self.balls.replace(throws)
         with tempfile.TemporaryDirectory() as directory:
             file = Path(directory) / _STATE_FILE

@@ -13,7 +13,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
-from msgs_config.compiled.message_form import read_motion
+from msgs_config.compiled.message_form import Places, read_motion
 from msgs_config.geometry import fixed_order, rotations
 from sim_node.physics.mujoco.part import Part
 
@@ -32,7 +32,7 @@ class MujocoBody(Part):
         self._world, self.character, self.speed_bound = world, character, speed_bound
         self._has_friction = any(joint.friction for joint in character.moving_joints)
         self._identity: list[float] = []  # MuJoCo's position that is no position at all
-        quaternions: list[int] = []  # see `read_motion`
+        quaternions: list[int] = []  # see `Places`
         vectors: list[int] = []
         numbers: list[int] = []
         entries: list[int] = []
@@ -46,14 +46,14 @@ class MujocoBody(Part):
                 quaternions.append(len(self._identity))
                 vectors.append(joint.rotation.start)
                 self._identity += _NO_TURN_WXYZ
-        self._places = [
-            np.array(places, dtype=np.intp) for places in (quaternions, vectors, numbers, entries)
-        ]
+        self.places = Places(
+            *(np.array(each, dtype=np.intp) for each in (quaternions, vectors, numbers, entries))
+        )
 
     def read(self) -> FloatArray:
         """Position and velocity, (2, n)."""
         data, place = self._world.data, self.place
-        return read_motion(data.qpos[place.positions], data.qvel[place.velocities], *self._places)
+        return read_motion(data.qpos[place.positions], data.qvel[place.velocities], *self.places)
 
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""

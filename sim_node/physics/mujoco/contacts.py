@@ -5,7 +5,7 @@ import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
 
-_SLOWING = 0.1  # times as fast as what is normal to a surface
+SLOWING = 0.1  # times as fast as what is normal to a surface
 _NUMBERS, _DAMPING = 4, 1  # of a constraint's reference, and the one that is times its velocity
 _FORCE_NUMBERS = 6  # of one contact, in its own frame: a force and a torque
 
@@ -23,7 +23,7 @@ def soften_friction(data: mujoco.MjData) -> None:
     if data.nefc > before:
         # of each contact twelve numbers: four of what is normal to it, and of each way along it
         contacts = data.efc_KBIP[before:].reshape(-1, 3 * _NUMBERS)
-        contacts[:, _NUMBERS + _DAMPING :: _NUMBERS] *= _SLOWING
+        contacts[:, _NUMBERS + _DAMPING :: _NUMBERS] *= SLOWING
 
 
 def sum_contacts(

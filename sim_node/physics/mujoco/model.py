@@ -18,7 +18,13 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.meshes.parts import read_parts
 from msgs_config.character.model import Character, Joint, Link, Pose, Shape, ShapeType
-from msgs_config.character.mujoco_model import add_links, ancestors, compile_exactly, geometry
+from msgs_config.character.mujoco_model import (
+    add_hull,
+    add_links,
+    ancestors,
+    compile_exactly,
+    geometry,
+)
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.character.urdf.mimic import Mimic
 from msgs_config.errors import CharacterError
@@ -198,8 +204,7 @@ def _add_shape(
         return
     turn = rotations.wxyz_from_xyzw(np.array(shape.pose.orientation_xyzw))
     for vertices in read_parts(Path(shape.mesh)):
-        mesh = spec.add_mesh(name=f"mesh {len(spec.meshes)}", scale=shape.size)
-        mesh.uservert = vertices.ravel()
+        mesh = add_hull(spec, vertices, shape.size)
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # also of what has no volume
         place = {"pos": shape.pose.position, "quat": turn, "meshname": mesh.name}
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, **place, **surface)

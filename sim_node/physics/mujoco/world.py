@@ -212,4 +212,6 @@ class MujocoWorld:
             part[:], numbers = numbers[: len(part)], numbers[len(part) :]
         data.qfrc_applied[:] = 0.0
         self.pushes.clear()
+        bodies = self.model.nbody  # none touch, until a step says it
+        self._contacts = np.zeros((bodies, 6)), np.zeros(bodies, dtype=np.bool_)
         self.forget_frames()

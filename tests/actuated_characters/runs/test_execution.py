@@ -410,6 +410,25 @@ def test_a_signal_ends_it_in_seconds_and_keeps_what_was_recorded(
     assert ticks == list(range(1, len(ticks) + 1))
 
 
+def test_without_a_bag_no_process_records_and_a_signal_keeps_the_figures(
+    domain: int, processes: Processes, context: Context, tmp_path: Path
+) -> None:
+    own = {"ROS_DOMAIN_ID": str(domain)}
+    run = Run(processes, *LONG_WALK, "--no-record", "--output", "run", **own)
+    client = Client(context)
+    states = client.listen(topics.JOINT_STATES)
+    client.spin_until(lambda: len(states) > 100, "states of the run")
+    client.close()
+
+    modules = {command.split(" -m ")[1].split()[0] for command in run.family.values()}
+    assert modules == {"actuated_characters.cli", "sim_node.main", "controller_node.main"}
+    run.process.send(signal.SIGINT)
+    assert run.process.wait(SECONDS) == 130
+    assert "Traceback" not in run.process.stderr
+    assert run.family == {}
+    assert summary_of(tmp_path / "run")["ticks"] > 90
+
+
 def test_no_process_outlives_a_run_that_is_killed(processes: Processes, tmp_path: Path) -> None:
     run = Run(processes, *LONG_WALK, "--output", "run").wait_for_ticks(tmp_path / "run")
     assert len(run.family) == 4

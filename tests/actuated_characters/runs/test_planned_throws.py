@@ -36,6 +36,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from sim_node.physics.balls.sphere_sweep import find_impact
 from sim_node.physics.simulation import Simulation
+from tests.support.engines import pybullet
 from tests.support.physics import character
 from tests.support.runs import run_plan
 from tests.support.thrown_states import watch_states
@@ -80,8 +81,6 @@ def first_hit(plan: RunPlan, planned: PlannedThrow) -> tuple[int, tuple[str, ...
 
 def _touching(run: Simulation, ball: int) -> tuple[str, ...]:
     """The links of the character that a ball pushes, by the engine's own list."""
-    from sim_node.physics.bullet.client import pybullet
-
     body = run.characters[0]._body
     points = pybullet.getContactPoints(ball, body._body, physicsClientId=body._client)
     return tuple(LINKS[body._row[point[4]]] for point in points)

@@ -13,8 +13,8 @@ from actuated_characters.runs.planned.throw_hits import States, find_hit
 from actuated_characters.runs.planned.throws import PlannedThrow
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.simulation import Simulation
+from tests.support.engines import pybullet
 from tests.support.physics import character
 from tests.support.thrown_states import watch_states
 

@@ -9,6 +9,7 @@ from numba.core.registry import CPUDispatcher as Dispatcher
 from controller_node.planner.compiled import decorator, rollout
 from msgs_config.compiled import decorator as basics
 from msgs_config.compiled.decorator import Compiler
+from sim_node.physics.mujoco import compiled_step
 
 
 def test_the_rollouts_are_kept_where_the_planners_sources_count() -> None:
@@ -21,6 +22,7 @@ def test_the_rollouts_are_kept_where_the_planners_sources_count() -> None:
     [
         ("msgs_config.compiled", basics.compiled),
         ("controller_node.planner.compiled", decorator.compiled),
+        ("sim_node.physics.mujoco", compiled_step.compiled),
     ],
 )
 def test_every_compiled_function_is_of_a_source_that_counts(

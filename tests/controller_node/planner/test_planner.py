@@ -166,6 +166,27 @@ def test_nothing_is_found_where_all_comes_to_nothing() -> None:
     assert found.cost == np.inf
 
 
+@pytest.mark.parametrize(("sound", "about"), [(9, "the place itself"), (3, "most samples")])
+def test_the_best_sample_is_found_where_steps_cannot_be(sound: int, about: str) -> None:
+    draws = np.arange(18.0).reshape(9, 2) + 1.0
+    here = np.zeros(2)
+
+    def of_places(places: FloatArray) -> FloatArray:
+        rows = places.copy()
+        rows[1 + sound :] = np.inf  # rows: the place, and then the samples
+        if about == "the place itself":
+            rows[0] = np.inf
+        return rows
+
+    problem = LeastSquaresProblem(of_places, lambda rows: rows - 3.5, 0.0, 100.0)
+
+    found = improve(problem, here, draws, None)
+
+    assert found.place.tolist() == [3.0, 4.0]  # the sample nearest to the least, (3.5, 3.5)
+    assert found.cost == 0.5
+    assert found.sensitivities is None
+
+
 @pytest.mark.slow
 def test_a_costly_plan_is_sought_for_longer() -> None:
     def plan_with(rounds: int, tolerance: float) -> Outlook:

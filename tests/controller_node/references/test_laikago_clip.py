@@ -11,7 +11,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.geometry import rotations
-from sim_node.physics.bullet.client import pybullet
+from tests.support.engines import pybullet
 from tests.support.physics import character
 
 LAIKAGO = character("laikago")

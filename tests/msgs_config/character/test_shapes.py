@@ -12,7 +12,7 @@ from msgs_config.character.model import Pose, Shape, ShapeType
 from msgs_config.character.urdf.robot_description import robot_description
 from msgs_config.geometry import rotations
 from sim_node.physics.bullet.c_library import captured_output
-from sim_node.physics.bullet.client import Engine, pybullet
+from tests.support.engines import Engine, pybullet
 from tests.support.urdf import refusal
 
 ROBOTS = [

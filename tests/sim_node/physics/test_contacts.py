@@ -6,6 +6,8 @@ its step and the places in which the links were right before it.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import reduce
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +19,11 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.bullet.client import pybullet
-from sim_node.physics.bullet.world import BulletWorld
-from sim_node.physics.mujoco import world as mujoco_world
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.simulated_character import Contacts, SimulatedCharacter
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
+from tests.support.engines import pybullet
 from tests.support.physics import (
     character,
     joint_simulation,
@@ -159,9 +159,9 @@ def test_of_several_characters_each_has_its_own_also_if_one_alone_is_read() -> N
 
 def test_who_reads_none_looks_for_none(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     looked = []
-    owner, name = (
-        (BulletWorld, "_find_touched") if engine == "bullet" else (mujoco_world, "sum_contacts")
-    )
+    place = {"bullet": "BulletWorld._find_touched", "mujoco": "sum_contacts"}[engine]
+    *within, name = place.split(".")
+    owner = reduce(getattr, within, import_module(f"sim_node.physics.{engine}.world"))
     find = getattr(owner, name)
 
     def counted(*arguments: Any) -> Any:

@@ -9,10 +9,10 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.simulation import Simulation
 from sim_node.physics.wrenches import ExternalWrench
+from tests.support.engines import pybullet
 from tests.support.physics import LoneSimulation, character, joint_simulation, simulation
 
 pytestmark = pytest.mark.usefixtures("engine")

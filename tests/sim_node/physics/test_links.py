@@ -17,10 +17,10 @@ from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.engine import Body, make_world
 from sim_node.physics.mujoco.body import MujocoBody
 from sim_node.physics.settings import WorldSettings
+from tests.support.engines import pybullet
 from tests.support.physics import (
     EVERY_CHARACTER,
     INSTANT,

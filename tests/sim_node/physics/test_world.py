@@ -11,6 +11,7 @@ from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from sim_node.physics.engine import make_world
 from sim_node.physics.settings import STEADY_CONTACTS, WorldSettings
 from tests.support.physics import (
     LoneWorld,
@@ -84,6 +85,24 @@ def test_a_restored_state_remembers_nothing_of_what_was_done_in_between() -> Non
         second = trajectory(world, wriggling(1), 240)
 
     assert second == first
+
+
+def test_nothing_touches_from_a_restored_state_on_until_the_next_step() -> None:
+    """Not what led to the state, and not what led to the one before it was restored."""
+    with fallen_humanoid() as world:
+        saved = world.to_bytes()
+        advance(world, np.zeros(SIZE))
+        next_one = world.body.contact_wrenches()
+
+        world.from_bytes(saved)
+        wrenches, touching = world.body.contact_wrenches()
+        advance(world, np.zeros(SIZE))
+        again = world.body.contact_wrenches()
+
+    assert not wrenches.any() and not touching.any()
+    assert next_one[1].any()
+    np.testing.assert_array_equal(again[0], next_one[0])
+    np.testing.assert_array_equal(again[1], next_one[1])
 
 
 @pytest.mark.parametrize("threshold", [0.02, 0.3])
@@ -169,3 +188,26 @@ def test_a_box_rests_on_the_ground_at_z_zero(tmp_path: Path) -> None:
 
         assert world.body.read()[0][2] == pytest.approx(0.1, abs=2e-3)
         assert kinetic_energy(world.body, box) < 1e-6
+
+
+@pytest.mark.parametrize("faces", ["f 1 2 3 4", "f 1 2 3\no other\nf 1 3 4"], ids=["one", "two"])
+def test_a_flat_mesh_collides(tmp_path: Path, faces: str) -> None:
+    """A sheet falls onto the ground, and a box onto the sheet: not through it."""
+    (tmp_path / "sheet.obj").write_text(f"v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n{faces}\n")
+    box = box_character(tmp_path, "0.4 0.4 0.2")
+    sheet = box_character(tmp_path, "1 1 1", name="sheet")
+    urdf = sheet.loading.urdf_path
+    urdf.write_text(urdf.read_text().replace('<box size="1 1 1"/>', '<mesh filename="sheet.obj"/>'))
+    sheet = load_character(str(sheet.file))
+    with make_world(WorldSettings()) as world:
+        heights = {world.add(sheet): 0.05, world.add(box): 0.3}
+        for body, height in heights.items():
+            body.set_state(np.array([0.0, 0.0, height, 0.0, 0.0, 0.0]), np.zeros(6))
+        for _ in range(480):
+            for body in heights:
+                body.apply(np.zeros(6))
+            world.step()
+        on_ground, on_sheet = (float(body.read()[0][2]) for body in heights)
+
+    assert on_ground == pytest.approx(0.0, abs=3e-3)
+    assert on_sheet == pytest.approx(0.1, abs=5e-3)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pybullet_data
 import pytest
 
 from msgs_config.arrays import FloatArray
@@ -24,11 +25,8 @@ from msgs_config.character.shapes import read_shapes
 from msgs_config.character.urdf.repair import repair_urdf
 from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
+from tests.support.engines import Engine, load_urdf, pybullet
 from tests.support.urdf import joint, robot
-
-bullet = pytest.importorskip("sim_node.physics.bullet.client")
-pybullet = bullet.pybullet
-pybullet_data = pytest.importorskip("pybullet_data")
 
 PROJECT = Path(__file__).parents[4]
 DATA = Path(pybullet_data.getDataPath())
@@ -68,9 +66,9 @@ def ours(link: Link) -> Numbers:
 
 def bullets(loading: UrdfOptions) -> list[Numbers]:
     """The same from Bullet, with its joints' frames turned from the inertial ones to the links'."""
-    client = bullet.Engine()
+    client = Engine()
     try:
-        body = bullet.load_urdf(client, loading)
+        body = load_urdf(client, loading)
         names = [pybullet.getBodyInfo(body, physicsClientId=client)[0].decode()]
         links = [Numbers(names[0], -1, *dynamics_of(client, body, -1), ())]
         for number in range(pybullet.getNumJoints(body, physicsClientId=client)):

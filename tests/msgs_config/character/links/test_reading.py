@@ -104,6 +104,6 @@ def test_where_the_shipped_robots_are_not_installed_a_line_says_what_has_them(
         load_character(name)
 
     line = str(caught.value)
-    assert "package 'pybullet_data' is not installed; it comes with PyBullet: " in line
+    assert "package 'pybullet_data' is not installed; it comes with PyBullet, and alone by" in line
     assert "\n" not in line
     assert load_character("pendulum").name == "pendulum"

@@ -16,7 +16,7 @@ from msgs_config.character.meshes import resolving as meshes
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
 from sim_node.physics.bullet.c_library import captured_output
-from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
+from tests.support.engines import Engine, load_urdf, pybullet
 from tests.support.urdf import inertial, joint, link, refusal, robot, write_character
 
 CUBE = Path(pybullet_data.getDataPath()) / "cube.obj"

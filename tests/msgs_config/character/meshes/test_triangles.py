@@ -11,7 +11,7 @@ import trimesh
 from msgs_config.character.file import read_character_file
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.errors import CharacterError
-from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
+from tests.support.engines import Engine, load_urdf, pybullet
 from tests.support.urdf import inertial, link, refusal, robot
 
 WEDGE = trimesh.creation.box(extents=(0.2, 0.4, 0.6)).apply_translation((0.3, 0.0, 0.1))

@@ -15,6 +15,7 @@ from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 from msgs_config.messages.probe import DynamicsSample
 from sim_node.physics.probe import measure_probe
+from tests.support.engines import need_engine
 from tests.support.urdf import joint, link, refusal, robot, write_character
 
 
@@ -228,6 +229,7 @@ def test_a_link_that_the_engine_reads_otherwise_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As it would be without the repair of the text that the engine is given."""
+    need_engine("bullet")
     character = loaded(tmp_path, link("a", body(1.0, "1 2 4")))
     monkeypatch.setattr("sim_node.physics.bullet.urdf_text.repair_urdf", lambda *_: [])
 
