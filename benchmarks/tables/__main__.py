@@ -1,9 +1,10 @@
 """Many runs, and a table of what became of them: `python -m benchmarks.tables TABLE`.
 
 The tables of the pages: `clips`, `pushes` and `courses` are planned, by joint torques alone;
-`walk`, `jump` and `run` are of state machines; `captures` imports BVH files, and tracks them. A row
-is a kind of run; its yes or no are counted, and of numbers there are the median and, in brackets,
-the least and the largest. Runs are in one process each, as over topics.
+`walk`, `jump` and `run` are of state machines; `captures` imports BVH files, and tracks them;
+`ground` has how deep clips sink into each engine's ground. A row is a kind of run; its yes or no
+are counted, and of numbers there are the median and, in brackets, the least and the largest. Runs
+are in one process each, as over topics.
 """
 
 import argparse
@@ -23,14 +24,19 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 from rich.progress import Progress  # noqa: E402
 
 from benchmarks.support.printed import make_table  # noqa: E402
-from benchmarks.tables import captures, machines, planned  # noqa: E402
+from benchmarks.tables import captures, ground, machines, planned  # noqa: E402
 from benchmarks.tables.case import heavier  # noqa: E402
 from benchmarks.tables.many import Options, Result, RunTable, cell, results, rows  # noqa: E402
 from benchmarks.tables.push_map import draw  # noqa: E402
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of  # noqa: E402
 
 _WIDTH = 140  # characters; enough for every table
-TABLES: Mapping[str, RunTable] = {**planned.TABLES, **machines.TABLES, **captures.TABLES}
+TABLES: Mapping[str, RunTable] = {
+    **planned.TABLES,
+    **machines.TABLES,
+    **captures.TABLES,
+    **ground.TABLES,
+}
 
 
 def main() -> int:

@@ -20,7 +20,7 @@ from msgs_config.character.model import Character, Link
 from msgs_config.character.mujoco_model import (
     add_links,
     ancestors,
-    compile_exactly,
+    compile_for_contacts,
     geometry,
     quaternion_starts,
 )
@@ -179,7 +179,7 @@ def _compile(
         pair = spec.add_pair(geomname1=one, geomname2=other)
         pair.condim, pair.solref = 3, _CONTACT
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
-    return compile_exactly(spec, character.links)
+    return compile_for_contacts(spec, character.links)
 
 
 def _names(link: Link) -> list[str]:

@@ -71,6 +71,21 @@ def compile_exactly(spec: mujoco.MjSpec, links: Sequence[Link]) -> mujoco.MjMode
     return model
 
 
+def compile_for_contacts(spec: mujoco.MjSpec, links: Sequence[Link]) -> mujoco.MjModel:
+    """As `compile_exactly`, for a model with contacts, limits or friction.
+
+    MuJoCo scales these by how easily a force moves a body (`body_invweight0`, `dof_invweight0`),
+    which is then that of the links, not of the bodies that it has compiled.
+
+    Raises:
+        ValueError: MuJoCo refuses the model.
+    """
+    model = compile_exactly(spec, links)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    model.dof_simplenum[:] = 0
+    return model
+
+
 def _set_masses(model: mujoco.MjModel, masses: list[float]) -> None:
     """Set the masses of all bodies but the world's, and what MuJoCo has of their sums."""
     if model.body_mass[1:].tolist() == masses:

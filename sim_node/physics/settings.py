@@ -6,7 +6,7 @@ from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
 from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
 
 STEADY_CONTACTS = {"contact_breaking_threshold": 0.1}
-"""Parameters of a world in which a loaded foot stands on all of its sole."""
+"""Parameters of a world in which a loaded foot stands on all of its sole, if that is a mesh."""
 
 
 class WorldSettings(Settings):
@@ -31,7 +31,7 @@ class WorldSettings(Settings):
     contact_breaking_threshold: float = parameter(
         0.02,
         "engine bullet: how far apart a contact's points may be until they are dropped, as a share "
-        "of the smaller shape's size; with its own, 0.02, a loaded foot trembles on its edges",
+        "of the smaller shape's size; with its own, 0.02, a loaded sole that is a mesh trembles",
         minimum=1e-3,
         maximum=1.0,
         at_reset=True,

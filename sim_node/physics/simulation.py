@@ -236,7 +236,9 @@ class Simulation:
         # in a world without a step yet the engine has not found out what touches: only a fresh one
         # is like that
         is_first = all(its.before is None for _, its in each)
-        if is_first or snapshot.settings != self.settings:
+        # balls of the engine that are made anew would not be known again by what touched them
+        others = snapshot.balls[: len(self.balls)] != self.balls
+        if is_first or others or snapshot.settings != self.settings:
             self.settings = snapshot.settings
             for character, its in each:
                 character.begin_in(*its.start)

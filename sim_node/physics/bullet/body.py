@@ -18,6 +18,7 @@ from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.bullet.balls import BulletBalls
 from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
 from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics
+from sim_node.physics.bullet.ground import choose_ground
 from sim_node.physics.bullet.joint_constraints import couple_joints, set_friction
 from sim_node.physics.bullet.loaded_links import check_links
 from sim_node.physics.bullet.touches import TouchedLinks, net_wrenches
@@ -70,6 +71,7 @@ class BulletBody:
         self._base_read: BaseFrame | None = None  # None: not read since the engine's last step
         self._base_centre: scalars.Vector | None = None  # the base's centre of mass; None: unread
         self._find_joints(character)
+        choose_ground(client, self._body, self._numbers, character)
         set_link_dynamics(client, self._body, friction, speed_bound)
         pairs = zip(self._joints, self._axes, strict=True)
         ball_joints = [number for number, axes in pairs if axes is not None]

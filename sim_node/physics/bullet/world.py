@@ -16,6 +16,7 @@ from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.bullet.balls import BulletBalls
 from sim_node.physics.bullet.body import BulletBody
 from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
+from sim_node.physics.bullet.ground import add_ground, set_friction
 from sim_node.physics.bullet.touches import Touch, TouchedLinks
 from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.settings import WorldSettings
@@ -66,11 +67,9 @@ class BulletWorld:
             physicsClientId=self._client,
         )
         if settings.ground:
-            shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
-            ground = pybullet.createMultiBody(0.0, shape, physicsClientId=self._client)
-            self._set_friction(ground, settings.friction)
+            add_ground(self._client, settings.friction)
         if settings.terrain is not None:
-            self._set_friction(load_urdf(self._client, settings.terrain), settings.friction)
+            set_friction(self._client, load_urdf(self._client, settings.terrain), settings.friction)
         self.balls = BulletBalls(self._client, settings.link_friction)
         self._touched: TouchedLinks | None = None  # None: not asked for since the last step
 
@@ -175,9 +174,3 @@ class BulletWorld:
             file = Path(directory) / _STATE_FILE
             file.write_bytes(state)
             pybullet.restoreState(fileName=str(file), physicsClientId=self._client)
-
-    def _set_friction(self, body: int, friction: float) -> None:
-        for link in range(-1, pybullet.getNumJoints(body, physicsClientId=self._client)):
-            pybullet.changeDynamics(
-                body, link, lateralFriction=friction, physicsClientId=self._client
-            )

@@ -22,7 +22,7 @@ from msgs_config.character.mujoco_model import (
     add_hull,
     add_links,
     ancestors,
-    compile_exactly,
+    compile_for_contacts,
     geometry,
 )
 from msgs_config.character.terrain import terrain_shapes
@@ -90,16 +90,13 @@ def _compile(
         _add_body(spec, "", [link], settings)
     links = [link for character in characters for link in character.links] + ball_links
     try:
-        model = compile_exactly(spec, links)
-        # The masses that contacts are scaled by are the links', not those of the bodies compiled.
-        mujoco.mj_setConst(model, mujoco.MjData(model))
+        model = compile_for_contacts(spec, links)
     except (ValueError, mujoco.FatalError) as error:
         files = [str(each.file) for each in characters]
         if settings.terrain is not None:
             files.append(str(settings.terrain.urdf_path))
         reason = str(error).strip().replace("\n", "; ")
         raise CharacterError(f"{', '.join(files)}: not usable by MuJoCo: {reason}") from error
-    model.dof_simplenum[:] = 0
     return model
 
 

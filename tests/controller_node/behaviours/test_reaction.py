@@ -174,9 +174,9 @@ def test_while_it_reacts_the_root_has_no_more_than_a_fifth_of_the_weight() -> No
     assert forces[blend : blend + 60].max() > 0.2 * WEIGHT
 
 
-def test_it_is_back_on_the_clip_two_seconds_after_20_newton_seconds() -> None:
-    whole = walk(20.0, seconds=5.5)
-    since = tick_of(whole, Mode.REACT) + 2 * RATE_HZ
+def test_it_is_back_on_the_clip_three_seconds_after_20_newton_seconds() -> None:
+    whole = walk(20.0, seconds=6.5)
+    since = tick_of(whole, Mode.REACT) + 3 * RATE_HZ
 
     assert whole.mode_names()[-1] == "TRACK"
     assert whole.tick_of(whole.modes[-1]) < since

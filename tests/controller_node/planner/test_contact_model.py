@@ -17,7 +17,7 @@ from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
 from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
-from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.clips.reading import read_clip
 from msgs_config.compiled import mass_matrix, soft_limits
 from msgs_config.geometry import rotations
@@ -319,3 +319,17 @@ def test_draws_depend_on_their_key_alone_and_are_normal() -> None:
     assert abs(many.std() - 1.0) < 0.02
     assert abs((many**4).mean() - 3.0) < 0.2
     assert abs(np.corrcoef(many[:-1], many[1:])[0, 1]) < 0.02
+
+
+def test_contacts_are_scaled_by_what_the_links_weigh() -> None:
+    # the mean over axes of the acceleration of a link's centre by a unit force, and by a torque
+    position = message_form(MODEL.model.qpos0)
+    model = still_model(HUMANOID, position)
+    inverse = np.linalg.inv(model.mass_matrix())
+    origins, axes = model.link_frames(np.arange(len(HUMANOID.links)))
+    for index, link in enumerate(HUMANOID.links):
+        centre = origins[index] + axes[index] @ link.inertial_pose.position
+        jacobian = model.point_jacobian(index, centre)
+        gained = np.diag(jacobian @ inverse @ jacobian.T).reshape(2, 3).mean(axis=1)
+
+        np.testing.assert_allclose(MODEL.model.body_invweight0[index + 1], gained, rtol=1e-6)

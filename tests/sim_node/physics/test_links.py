@@ -281,8 +281,9 @@ def test_what_is_only_near_does_not_touch(box: Character, gap: float) -> None:
 
 
 def test_the_ground_carries_the_weight_of_a_box_at_rest(box: Character, engine: str) -> None:
-    # MuJoCo's solver starts from the last step's accelerations, which only tend to zero
-    tolerance = {"bullet": 1e-9, "mujoco": 1e-4}[engine]
+    # Bullet's solver ends where four corners share it nearly as before; MuJoCo's starts from the
+    # last step's accelerations, which only tend to zero
+    tolerance = {"bullet": 1e-8, "mujoco": 1e-4}[engine]
     with LoneWorld(box, WorldSettings()) as world:
         world.body.set_state(at_height(0.1), np.zeros(6))
 

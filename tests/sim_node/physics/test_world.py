@@ -6,13 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.runs.bare_loop import ticks_in_process
-from actuated_characters.runs.plan import make_plan
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from sim_node.physics.engine import make_world
-from sim_node.physics.settings import STEADY_CONTACTS, WorldSettings
+from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
     LoneWorld,
     advance,
@@ -122,26 +120,6 @@ def test_two_worlds_at_once_do_not_disturb_each_other(threshold: float) -> None:
 
 
 # --- physics -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("engine", ["bullet"], indirect=True)
-def test_a_loaded_foot_trembles_only_where_contacts_lose_their_points() -> None:
-    """A sole that keeps its corners does not tip to and fro from one tick to the next."""
-
-    def trembling(**settings: object) -> float:
-        motion = {"reference": "clip", "clip": "walk"}
-        plan = make_plan("humanoid", 2.0, motion, settings, {})
-        ankles = [joint.entries for joint in plan.character.layout.joints if "ankle" in joint.name]
-        speeds = [
-            np.concatenate([tick.following.velocity[entries] for entries in ankles])
-            for tick in ticks_in_process(plan)
-        ]
-        return float(np.mean(np.abs(np.diff(speeds, axis=0)).max(axis=1) > 30.0))  # rad/s
-
-    engines_own, steady = trembling(), trembling(**STEADY_CONTACTS)
-
-    assert engines_own > 0.04
-    assert steady < engines_own / 3.0
 
 
 @pytest.mark.parametrize("step_s", [1.0 / 240.0, 1.0 / 1000.0])
