@@ -1,5 +1,7 @@
 """The model of the dynamics on both sides of the loop: MuJoCo behind one class."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
@@ -11,6 +13,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
 _NONE: FloatArray = np.empty(0)
+_stable_pd: Callable[..., FloatArray] = compiled.stable_pd
 _OF_THE_DATA = ("_qpos", "_qvel", "_mass", "parts", "view")  # attributes that a copy makes anew
 
 
@@ -96,12 +99,10 @@ class DynamicsModel:
             _NONE if offset is None else offset,
             _NONE if feedforward is None else feedforward,
         )
-        effort: FloatArray
         try:
-            effort = compiled.stable_pd(self.view, *given, period)
+            return _stable_pd(self.view, *given, period)
         except TypeError:  # likewise
-            effort = compiled.stable_pd(self.view, *_doubles(*given), float(period))
-        return effort
+            return _stable_pd(self.view, *_doubles(*given), float(period))
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
         """Error (n,) from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
@@ -319,8 +320,8 @@ class DynamicsModel:
         return jacobian
 
 
-def _doubles(*arrays: FloatArray) -> list[FloatArray]:
-    return [np.asarray(array, dtype=np.float64) for array in arrays]
+def _doubles(*arrays: FloatArray) -> tuple[FloatArray, ...]:
+    return tuple(np.asarray(array, dtype=np.float64) for array in arrays)
 
 
 def still_model(character: Character, position: FloatArray) -> DynamicsModel:
