@@ -146,10 +146,11 @@ endif
 
 COMMA := ,
 PIP := $(BIN)/python -m pip
-# The package with its extras; then robots and clips, which are in PyBullet's wheel, where that
-# itself cannot be had; then what is compiled once.
+# First PyBullet where it is asked for, by a pip that is not quiet while it compiles; then the package
+# with its extras, robots and clips, which PyBullet's wheel has, and what is compiled once.
 define install
-@$(PIP) install -qq -e '.[$(1)$(if $(filter 1,$(BULLET)),$(COMMA)bullet)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
+$(if $(filter 1,$(BULLET)),@$(PIP) install pybullet==3.2.7 || { echo "$(PIP_FAILED)" >&2; exit 1; })
+@$(PIP) install -qq -e '.[$(1)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 $(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
 @$(BIN)/python -m msgs_config.fetch_robots || { echo "$(PIP_FAILED)" >&2; exit 1; }
 @$(BIN)/python -m actuated_characters.compile_all

@@ -17,9 +17,6 @@ from actuated_characters.given_arrays import (
     real_array,
 )
 from actuated_characters.metrics.state_hash import StateHash
-from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
-from actuated_characters.runs.execution import run_over_topics
-from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import choose_reference, make_plan
 from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import make_motion
@@ -397,6 +394,11 @@ def run(
     """
     if in_process and composed:
         raise ConfigurationError("in_process has no other process; composed must be false")
+    # A loop of one's own needs none of these, which are a tenth of what its first step takes.
+    from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
+    from actuated_characters.runs.execution import run_over_topics
+    from actuated_characters.runs.in_process import run_in_process
+
     plan = make_plan(character, duration, reference, simulator, controller)
     directory = Path(output).absolute()
     prepare_directory(directory, overwrite=overwrite)
