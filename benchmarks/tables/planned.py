@@ -15,6 +15,7 @@ from benchmarks.tables.seen import Seen
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import available_clips, read_clip
+from msgs_config.geometry import rotations
 
 CYCLE = 1.27  # s, of the walk
 BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
@@ -44,12 +45,22 @@ def clip_cases(clip: str, options: Options) -> Iterator[Case]:
 
 
 def measure_clip(seen: Seen) -> dict[str, Fact]:
-    """Errors, means over ticks; and whether it came to the end."""
+    """Errors, means over ticks, of the root also those of height and tilt; whether it was lost."""
     here, there = seen.centres(seen.position), seen.centres(seen.desired)
     joints = joint_errors(seen.plan.character.layout, seen.position, seen.desired)
+    roots = seen.position[:, :6], seen.desired[:, :6]
+    place = roots[0][:, :3] - roots[1][:, :3]
+    up, wanted = (
+        rotations.rotate(rotations.conjugate(rotations.exp(root[:, 3:])), np.array((0.0, 0.0, 1.0)))
+        for root in roots
+    )
+    tilts = np.arctan2(np.linalg.norm(np.cross(up, wanted), axis=1), (up * wanted).sum(axis=1))
     return {
         "to the end": seen.lost_at is None,
         "centre of mass, m": float(np.linalg.norm(here - there, axis=1).mean()),
+        "root, m": float(np.linalg.norm(place, axis=1).mean()),
+        "height, m": float(np.abs(place[:, 2]).mean()),
+        "tilt, rad": float(tilts.mean()),
         "joints, rad": float(joints.mean()),
         "lost at, s": None if seen.lost_at is None else f"{seen.lost_at:.2f}",
     }

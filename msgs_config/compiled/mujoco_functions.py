@@ -70,6 +70,9 @@ find_velocity_terms = _of_model_and_data("mj_fwdVelocity")
 find_free_acceleration = _of_model_and_data("mj_fwdAcceleration")
 """`(model, data)`: the acceleration without constraints, by the forces that were set."""
 
+apply_jacobian = _function("mj_mulJacVec", _ADDRESS, _ADDRESS, _ADDRESS, _ADDRESS)
+"""`(model, data, rows, velocity)`: of a velocity (n,) that of the constraints' rows (r,)."""
+
 solve_constraints = _of_model_and_data("mj_fwdConstraint")
 """`(model, data)`: the constraints' forces, and the acceleration with them."""
 

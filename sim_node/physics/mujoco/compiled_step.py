@@ -1,6 +1,6 @@
 """An engine step of `MujocoWorld` with one character in it, in one compiled call: the same bits.
 
-The functions are those of `MujocoWorld.step`, `soften_friction` and `sum_contacts`, which the tests
+The functions are those of `MujocoWorld.step`, `set_friction` and `sum_contacts`, which the tests
 compare. All that a step leaves behind is read before the next one, so that one thread's memory
 simulates one world after the other.
 """
@@ -14,8 +14,8 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.compiled import mujoco_functions as mj
 from msgs_config.compiled.decorator import Compiler
+from msgs_config.compiled.friction import ask_of_contact
 from sim_node.physics import batch
-from sim_node.physics.mujoco.contacts import SLOWING
 from sim_node.physics.mujoco.data_layout import DataFields, RawData, data_fields, raw_data
 
 _FOLDER = Path(__file__).parent
@@ -31,6 +31,7 @@ class StepBuffers(NamedTuple):
     position: FloatArray  # (q,)
     velocity: FloatArray  # (n,)
     applied: FloatArray  # (n,)
+    smooth: FloatArray  # (n,) acceleration without constraints
     origins: FloatArray  # (bodies, 3) m
     axes: FloatArray  # (bodies, 9)
     centres: FloatArray  # (bodies, 3) m, centres of mass
@@ -65,6 +66,7 @@ def step_buffers(
         data.qpos,
         data.qvel,
         data.qfrc_applied,
+        data.qacc_smooth,
         data.xpos,
         data.xmat,
         data.xipos,
@@ -89,12 +91,12 @@ def step(world: int, tick: int, pushes: Pushes, buffers: StepBuffers) -> bool:
     mj.find_position_terms(model, data)
     if not _has_room(buffers):
         return False
-    _soften_friction(buffers)
     mj.find_velocity_terms(model, data)
     for push in range(pushes.starts[world], pushes.starts[world + 1]):
         if pushes.first_ticks[push] <= tick < pushes.last_ticks[push]:
             _apply(push, pushes, buffers)
     mj.find_free_acceleration(model, data)
+    _set_friction(buffers)
     mj.solve_constraints(model, data)
     buffers.before[:] = buffers.position
     mj.advance_explicitly(model, data)
@@ -114,17 +116,22 @@ def _has_room(buffers: StepBuffers) -> bool:
 
 
 @compiled.inlined
-def _soften_friction(buffers: StepBuffers) -> None:
-    """See `soften_friction`."""
+def _set_friction(buffers: StepBuffers) -> None:
+    """See `set_friction`."""
     raw, fields = buffers.raw, buffers.fields
-    before = 0
-    for kind in range(3):
-        before += raw.numbers[fields.bilateral_rows + kind]
-    start = (raw.words[fields.constraint_pointer] - raw.arena_start) // 8
-    # of each contact twelve numbers: four of what is normal to it, and of each way along it
-    for first in range(before, raw.numbers[fields.rows], 3):
-        for row in (first + 1, first + 2):
-            raw.arena[start + 4 * row + 1] *= SLOWING
+    contacts = raw.numbers[fields.contacts]
+    if contacts == 0:
+        return
+    smooth = np.empty(raw.numbers[fields.rows])
+    out, acceleration = smooth.ctypes.data, buffers.smooth.ctypes.data
+    mj.apply_jacobian(buffers.model, buffers.data, out, acceleration)
+    start = (raw.words[fields.contact_pointer] - raw.arena_start) // 8
+    reference = raw.arena[(raw.words[fields.reference_pointer] - raw.arena_start) // 8 :]
+    for number in range(contacts):
+        first = start + number * fields.contact_words
+        row = raw.arena_numbers[2 * first + fields.constraint]
+        if row >= 0:  # else apart, or between what cannot move
+            ask_of_contact(row, raw.arena[first + fields.friction], reference, smooth)
 
 
 @compiled.inlined

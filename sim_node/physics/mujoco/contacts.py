@@ -4,26 +4,20 @@ import mujoco
 import numpy as np
 
 from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.compiled.friction import ask_for_friction
 
-SLOWING = 0.1  # times as fast as what is normal to a surface
-_NUMBERS, _DAMPING = 4, 1  # of a constraint's reference, and the one that is times its velocity
 _FORCE_NUMBERS = 6  # of one contact, in its own frame: a force and a torque
 
 
-def soften_friction(data: mujoco.MjData) -> None:
-    """Have friction slow what slides over some steps instead of within one.
+def set_friction(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Have contacts ask for friction as `ask_for_friction` says.
 
-    MuJoCo's solver treats friction as convex: what slides is lifted off the ground at the slope of
-    its friction, by as much of its speed as a step would take (Todorov 2014, "Convex and
-    analytically-invertible dynamics with contacts and constraints"). So a sliding foot would hop.
-    MuJoCo's own setting of that (`solreffriction`) is for pairs of shapes that are listed one by
-    one. To be called after `mj_fwdPosition`.
+    To be called after `mj_fwdAcceleration`, and before `mj_fwdConstraint`.
     """
-    before = data.ne + data.nf + data.nl  # rows of couplings, friction and limits
-    if data.nefc > before:
-        # of each contact twelve numbers: four of what is normal to it, and of each way along it
-        contacts = data.efc_KBIP[before:].reshape(-1, 3 * _NUMBERS)
-        contacts[:, _NUMBERS + _DAMPING :: _NUMBERS] *= SLOWING
+    if data.ncon:
+        smooth, contact = np.empty(data.nefc), data.contact
+        mujoco.mj_mulJacVec(model, data, smooth, data.qacc_smooth)
+        ask_for_friction(data.efc_aref, smooth, contact.friction, contact.efc_address)
 
 
 def sum_contacts(

@@ -35,13 +35,13 @@ class DataFields(NamedTuple):
 
     contacts: int  # how many there are, in numbers
     rows: int  # of all constraints, in numbers
-    bilateral_rows: int  # those of couplings, friction and limits, three numbers in a row
     full: IntArray  # (k,) in numbers: how often there was no room
     contact_pointer: int  # in words
-    constraint_pointer: int  # in words: `efc_KBIP`
+    reference_pointer: int  # in words: `efc_aref`, what the constraints ask for
     contact_words: int  # size of a contact
     point: int  # in words within a contact
     frame: int  # in words within a contact
+    friction: int  # in words within a contact
     shapes: int  # in numbers within a contact
     constraint: int  # in numbers within a contact: its first row, -1 without one
 
@@ -72,13 +72,13 @@ def data_fields() -> DataFields:
     fields = DataFields(
         contacts=data.ncon.offset // 4,
         rows=data.nefc.offset // 4,
-        bilateral_rows=data.ne.offset // 4,
         full=np.array(full, dtype=np.intp) // 4,
         contact_pointer=data.contact.offset // 8,
-        constraint_pointer=data.efc_KBIP.offset // 8,
+        reference_pointer=data.efc_aref.offset // 8,
         contact_words=ctypes.sizeof(contact) // 8,
         point=contact.pos.offset // 8,
         frame=contact.frame.offset // 8,
+        friction=contact.friction.offset // 8,
         shapes=contact.geom.offset // 4,
         constraint=contact.efc_address.offset // 4,
     )
@@ -120,20 +120,22 @@ def _check(fields: DataFields) -> None:
     mujoco.mj_forward(model, data)
     raw = raw_data(data)
     first = (int(raw.words[fields.contact_pointer]) - raw.arena_start) // 8
-    row = (int(raw.words[fields.constraint_pointer]) - raw.arena_start) // 8
+    row = (int(raw.words[fields.reference_pointer]) - raw.arena_start) // 8
     found = (
         int(raw.numbers[fields.contacts]),
         int(raw.numbers[fields.rows]),
-        *raw.arena[row : row + 4].tolist(),
+        *raw.arena[row : row + 3].tolist(),
         *raw.arena[first + fields.point : first + fields.point + 3].tolist(),
         *raw.arena[first + fields.frame : first + fields.frame + 9].tolist(),
+        *raw.arena[first + fields.friction : first + fields.friction + 5].tolist(),
         *raw.arena_numbers[2 * first + fields.shapes :][:2].tolist(),
         int(raw.arena_numbers[2 * first + fields.constraint]),
     )
     contact = data.contact
     expected = (
-        *(data.ncon, data.nefc, *data.efc_KBIP.reshape(-1, 4)[0].tolist()),
-        *(*contact.pos[0].tolist(), *contact.frame[0].tolist(), *contact.geom[0].tolist()),
+        *(data.ncon, data.nefc, *data.efc_aref[:3].tolist()),
+        *(*contact.pos[0].tolist(), *contact.frame[0].tolist()),
+        *(*contact.friction[0].tolist(), *contact.geom[0].tolist()),
         int(contact.efc_address[0]),
     )
     if found != expected:

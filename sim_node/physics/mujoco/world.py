@@ -19,7 +19,7 @@ from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.engine import UNLIMITED_SPEED
 from sim_node.physics.mujoco.balls import MujocoBalls
 from sim_node.physics.mujoco.body import MujocoBody
-from sim_node.physics.mujoco.contacts import soften_friction, sum_contacts
+from sim_node.physics.mujoco.contacts import set_friction, sum_contacts
 from sim_node.physics.mujoco.model import compile_world
 from sim_node.physics.mujoco.part import NOTHING, Part
 from sim_node.physics.settings import WorldSettings
@@ -144,10 +144,10 @@ class MujocoWorld:
         mujoco.mj_fwdPosition(model, data)
         if any(data.warning[each].number for each in _FULL):
             raise SimulationError("more touches at once than the engine 'mujoco' has room for")
-        soften_friction(data)
         mujoco.mj_fwdVelocity(model, data)
         self._apply_pushes(model, data)
         mujoco.mj_fwdAcceleration(model, data)
+        set_friction(model, data)
         mujoco.mj_fwdConstraint(model, data)
         before = data.qpos.copy()
         mujoco.mj_Euler(model, data)

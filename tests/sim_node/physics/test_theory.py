@@ -156,3 +156,21 @@ def test_what_slides_stays_on_the_ground(box: Character) -> None:
             heights.append(world.body.read()[0][2])
 
     assert max(heights) < 0.1 + 1e-3
+    assert min(heights) > 0.1 - 3e-3
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_a_sole_that_bears_a_load_stops_where_friction_says(box: Character, speed: float) -> None:
+    """As a foot does that lands: it is light, and what presses is heavy."""
+    friction, load = 0.5, np.array([0.0, 0.0, -450.0, 0.0, 0.0, 0.0])
+    with LoneWorld(box, WorldSettings(friction=friction, link_friction=1.0)) as world:
+        world.body.set_state(np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0]), np.zeros(6))
+        advance(world, load, 120)
+        start, _ = world.body.read()
+        world.body.set_state(start, np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        advance(world, load, 60)
+        end, _ = world.body.read()
+
+    slowing = friction * (GRAVITY + 450.0 / 2.0)  # m/s^2
+    within_a_step = speed * STEP
+    assert end[0] - start[0] == pytest.approx(speed**2 / (2.0 * slowing), abs=within_a_step)
