@@ -1,8 +1,10 @@
 """`python -m actuated_characters.compile_all`: what is computed often is compiled, and kept.
 
-Else that which the planner and the renderer compute is compiled at the first plan, and picture.
+Else that which the planner, the renderer and batches compute is compiled at the first plan, picture
+and step.
 """
 
+from actuated_characters.batch.worlds import Batch
 from actuated_characters.render.engine.renderer import FrameSpec, Renderer
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
@@ -20,6 +22,8 @@ def main() -> None:
         plan = make_plan("humanoid", 0.05, clip, simulator, planner)
         *_, last = ticks_in_process(plan)
     Renderer(plan.character).picture(FrameSpec(last.following.position), _SIZE)
+    with Batch(plan.character, 1, threads=1, clip="walk") as batch:
+        batch.step()
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The model of the dynamics on both sides of the loop: MuJoCo behind one class."""
 
-from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,7 +13,6 @@ from msgs_config.geometry import fixed_order, rotations
 
 _GRAVITY = 9.81
 _NONE: FloatArray = np.empty(0)
-_stable_pd: Callable[..., FloatArray] = compiled.stable_pd
 _OF_THE_DATA = ("_qpos", "_qvel", "_mass", "parts", "view")  # attributes that a copy makes anew
 
 
@@ -99,10 +98,12 @@ class DynamicsModel:
             _NONE if offset is None else offset,
             _NONE if feedforward is None else feedforward,
         )
+        effort: FloatArray
         try:
-            return _stable_pd(self.view, *given, period)
+            effort = compiled.stable_pd(self.view, *given, period)
         except TypeError:  # likewise
-            return _stable_pd(self.view, *_doubles(*given), float(period))
+            effort = compiled.stable_pd(self.view, *_doubles(*given, period))
+        return effort
 
     def compute_error(self, position: FloatArray, desired: FloatArray) -> FloatArray:
         """Error (n,) from a position (n,) to a desired one (n,): `JointLayout.difference`, sooner.
@@ -320,8 +321,8 @@ class DynamicsModel:
         return jacobian
 
 
-def _doubles(*arrays: FloatArray) -> tuple[FloatArray, ...]:
-    return tuple(np.asarray(array, dtype=np.float64) for array in arrays)
+def _doubles(*numbers: FloatArray | float) -> Any:
+    return [np.asarray(each, dtype=np.float64)[()] for each in numbers]
 
 
 def still_model(character: Character, position: FloatArray) -> DynamicsModel:

@@ -29,6 +29,8 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
         "msgs_config/compiled/mujoco_functions.py",
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("balls", "body", "contacts")),
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("model", "part", "world")),
+        *(f"sim_node/physics/mujoco/{name}.py" for name in ("batch", "compiled_step")),
+        "sim_node/physics/mujoco/data_layout.py",
         "controller_node/planner/contact_model.py",
     },
 }

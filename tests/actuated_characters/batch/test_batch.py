@@ -106,6 +106,31 @@ def test_speeds_are_bounded_where_a_simulation_bounds_them(tmp_path: Path) -> No
     assert np.abs(batch.velocity).max() == 100.0
 
 
+def test_the_ground_may_be_a_terrain(tmp_path: Path) -> None:
+    file = tmp_path / "blocks.urdf"
+    file.write_text(
+        '<robot name="blocks"><link name="blocks"><collision><origin xyz="0 0 -0.5"/>'
+        '<geometry><box size="40 40 1"/></geometry></collision><collision>'
+        '<origin xyz="1.5 0 0"/><geometry><box size="1 2 0.1"/></geometry></collision></link>'
+        "</robot>"
+    )
+    given = {"terrain": str(file), "engine": "mujoco"}
+    law, simulation = pair("humanoid", WALK, given)
+    batch = Batch(law.character, 1, hash_states=True, simulator=given, **WALK)
+
+    go_on(law, simulation, 240)
+    batch.step(ticks=240)
+
+    assert batch.state_hashes[0] == simulation.state_hash
+    assert batch.state_hashes[0] != hash_on_a_plane(240)
+
+
+def hash_on_a_plane(ticks: int) -> str:
+    law, simulation = pair("humanoid", WALK, {})
+    go_on(law, simulation, ticks)
+    return simulation.state_hash
+
+
 @pytest.mark.parametrize("threads", [2, 3])
 def test_neither_threads_nor_other_worlds_count(threads: int) -> None:
     character, count = ac.load_character("humanoid"), 7
