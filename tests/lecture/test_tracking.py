@@ -23,7 +23,7 @@ from lecture.framework.tracking import (
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from sim_node.physics.settings import WorldSettings
-from tests.support.engines import pybullet
+from tests.support.engines import need_engine, pybullet
 from tests.support.in_process import InProcessRunner
 from tests.support.physics import LoneWorld, character
 
@@ -173,6 +173,7 @@ def test_growth_is_that_of_the_controllers_own_law_stepped_with_delay(
 
 
 def test_clearances_are_the_engines_distances_to_the_ground() -> None:
+    need_engine("bullet")
     whole = character("humanoid")
     rng = np.random.default_rng(2)
     position = np.array(whole.rest_position)

@@ -35,11 +35,12 @@ class _Missing:
         pytest.skip(NOT_INSTALLED, allow_module_level=True)
 
 
-pybullet: Any = _Missing()
-Engine: Any = _Missing()
-load_urdf: Any = _Missing()
 if BULLET_IS_INSTALLED:
-    from sim_node.physics.bullet.client import pybullet
+    from sim_node.physics.bullet import client
+
+    pybullet, Engine, load_urdf = client.pybullet, client.Engine, client.load_urdf
+else:
+    pybullet = Engine = load_urdf = _Missing()
 
 
 def need_engine(name: str) -> None:

@@ -17,6 +17,7 @@ from actuated_characters.bags.reader import read_messages
 from actuated_characters.runs.ros_domain import own_domain
 from msgs_config.messages import topics
 from msgs_config.runtime.process import LEAVE_TIME
+from tests.support.engines import BULLET_IS_INSTALLED
 from tests.support.ros import PATIENCE, Process, Processes, SimulatorClient, wait_until
 from tests.support.runs import Run
 
@@ -350,11 +351,12 @@ def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
 
 # On its way there
 
+ENGINE = f"/{'pybullet' if BULLET_IS_INSTALLED else 'libmujoco'}."
 COMMON_STAGES = ["", "_rclpy_pybind11", "/yaml/_yaml.", "_multiarray_umath"]
 STAGES = {  # what each loads, one after the other, once it handles signals
-    "sim_node": [*COMMON_STAGES, "/pybullet.", "/dev/shm/fastrtps_"],
+    "sim_node": [*COMMON_STAGES, ENGINE, "/dev/shm/fastrtps_"],
     "controller_node": [*COMMON_STAGES, "/libmujoco.", "/dev/shm/fastrtps_"],
-    "composed": [*COMMON_STAGES, "/pybullet.", "/libmujoco.", "/dev/shm/fastrtps_"],
+    "composed": [*COMMON_STAGES, *{ENGINE: 0, "/libmujoco.": 0}, "/dev/shm/fastrtps_"],
     "recorder": COMMON_STAGES,  # once it is there, having heard nobody is an error
 }
 
@@ -451,7 +453,7 @@ def assert_interrupted(run: Run) -> None:
 
 
 @pytest.mark.parametrize("number", ONE_SIGNAL)
-@pytest.mark.parametrize("stage", ["", "_multiarray_umath", "/pybullet.", "/libmujoco."])
+@pytest.mark.parametrize("stage", ["", "_multiarray_umath", *{ENGINE: 0, "/libmujoco.": 0}])
 def test_a_signal_ends_a_run_that_is_being_planned(
     processes: Processes, tmp_path: Path, stage: str, number: signal.Signals
 ) -> None:
