@@ -18,6 +18,7 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.parameters import Values
 from msgs_config.plain_values import plain_parameters
 from msgs_config.shared_parameters import SharedSettings, placed
+from sim_node.initial_state import INITIAL_STATE, POSITION, VELOCITY
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.batch import ActionKind, BatchSetup
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
@@ -57,6 +58,11 @@ def make_setup(
     given, ours = with_shared(
         plain_parameters({"engine": "mujoco", **simulator}), plain_parameters(controller)
     )
+    for name in (INITIAL_STATE, POSITION, VELOCITY):
+        if name in given:
+            raise ConfigurationError(
+                f"parameter '{name}': worlds begin where the reference does; reset() takes others"
+            )
     here = placed(character, given)
     values = controller_parameters.resolve_for(here, {**choose_reference(ours), **ours})
     settings = controller_parameters.make_controller_settings(here, values)

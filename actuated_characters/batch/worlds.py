@@ -33,6 +33,7 @@ from sim_node.physics.engine import make_batch
 
 _NOTHING: Mapping[str, object] = MappingProxyType({})
 _ROWS_AHEAD = 512  # ticks of the reference that are sampled beyond those that are needed
+_MOST_ROWS = 200_000  # ticks of the reference between worlds: 0.1 GB of a humanoid
 _TICKS_AT_ONCE = 256  # after which states are hashed, and the reference is looked at again
 _MOST_WORLDS, _MOST_THREADS, _MOST_TICKS = 1_000_000, 1024, 10**9
 
@@ -313,6 +314,11 @@ class Batch:
         first, last = int(rows.min()), int(rows.max()) + ticks
         if first in self._rows and last in self._rows:
             return
+        if last - first > _MOST_ROWS:
+            raise ConfigurationError(
+                f"the worlds are {last - first} ticks of the reference apart; it can be "
+                f"{_MOST_ROWS} at most"
+            )
         self._rows = range(first, last + _ROWS_AHEAD)
         self._samples = np.array([self._sample(row) for row in self._rows])
         velocities = self._samples[:, 1] * self._follows_velocity

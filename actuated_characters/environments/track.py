@@ -131,7 +131,10 @@ class TrackEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._actuation = self._make_actuation(action, values, model, clock)
         self.action_space = self._actuation.space
         self._simulation = Simulation(
-            self._character, motion.first_state(), simulator, watch_contacts=False
+            self._character,  # which is placed already
+            motion.first_state(),
+            {name: value for name, value in simulator.items() if name != "placement"},
+            watch_contacts=False,
         )
         world = self._simulation.settings.world
         self._assessment = Assessment(

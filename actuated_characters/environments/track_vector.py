@@ -23,6 +23,7 @@ from actuated_characters.runs.plan import choose_reference, with_shared
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
+from msgs_config.errors import ConfigurationError
 from msgs_config.shared_parameters import SharedSettings, collides, placed
 
 _NOTHING: Mapping[str, object] = MappingProxyType({})
@@ -113,9 +114,12 @@ class TrackVectorEnv(VectorEnv[FloatArray, FloatArray, Any]):
         Each environment has random numbers of its own: those of `seed`, `seed + 1` and so on.
 
         Raises:
-            ConfigurationError: the start is no time, or there is another option.
+            ConfigurationError: the start is no time, there is another option, or a list of seeds
+                has another length.
         """
         seeds = seed if isinstance(seed, list) else [seed] * self.num_envs
+        if len(seeds) != self.num_envs:
+            raise ConfigurationError(f"seed has {len(seeds)} entries; it must be {self.num_envs}")
         for number, own in enumerate(seeds):
             if own is not None:
                 each = own if isinstance(seed, list) else own + number
@@ -158,7 +162,9 @@ class TrackVectorEnv(VectorEnv[FloatArray, FloatArray, Any]):
         """Begin episodes at a time of the reference; None: where each is to."""
         worlds = np.flatnonzero(which)
         times = [self._drawn_start(world) if start is None else start for world in worlds.tolist()]
-        ticks: IntArray = np.array([int(time * self._rate_hz) for time in times], dtype=np.intp)
+        ticks: IntArray = np.array(
+            [int(round(time * self._rate_hz, 6)) for time in times], dtype=np.intp
+        )
         self._batch.reset(worlds, at=ticks)
         self._down[worlds] = 0
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)

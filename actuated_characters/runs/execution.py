@@ -59,7 +59,8 @@ def run_over_topics(
     Raises:
         RunError: one of the processes failed, or the simulator rejected a push or throw.
     """
-    recording = {**recording, "directory": str(directory), "write_bag": write_bag}
+    about = {"directory": str(directory), "write_bag": write_bag, "progress_period": 0.1}
+    recording = {**recording, **about}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
     planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
@@ -67,11 +68,15 @@ def run_over_topics(
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
-        recorder = _start_recorder(children, recording, session, environment)
+        recorder: Member | None = None
+        if write_bag:
+            recorder = children.start_node("recorder", recording, *session)
         sender = [children.start_node(name, given, *session) for name, given in senders.items()]
         # of the torques, before the first answer, or a tick would go unrecorded
         listeners = (2 + (fork is not None), 2 + len(sender))
         loop = _start_loop(children, plan, session, listeners, composed=composed)
+        if recorder is None:
+            recorder = _start_measuring(children, recording, session, environment)
         wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
@@ -79,16 +84,13 @@ def run_over_topics(
     check_recorded(directory, plan.ticks - resets, counts)
 
 
-def _start_recorder(
+def _start_measuring(
     children: Children,
     recording: Mapping[str, object],
     session: Sequence[str],
     environment: Mapping[str, str],
 ) -> Member:
-    """Start the recorder: a process of its own where there is a bag to be written."""
-    recording = {**recording, "progress_period": 0.1}
-    if recording["write_bag"]:
-        return children.start_node("recorder", recording, *session)
+    """Start a recorder that writes no bag, in a thread of this process."""
     from actuated_characters.runs.recorder_thread import RecorderThread
 
     file = write_parameters(children.directory, "recorder", recording)

@@ -217,10 +217,13 @@ class Children:
         return self._start(name, [file], ros_arguments, arguments)
 
     def start_thread(self, make: Callable[[], Member]) -> Member:
-        """Start one that is no process; a signal waits until it is one that will be ended."""
+        """Start one that is no process, to be ended last; a signal waits until it will be.
+
+        To be called after all processes were started: to fork one beside threads is not safe.
+        """
         with signals_held():
-            self._members.append(make())
-        return self._members[-1]
+            self._members.insert(0, make())
+        return self._members[0]
 
     def start_composed(
         self, name: str, parameters: Mapping[str, Mapping[str, object]], *ros_arguments: str

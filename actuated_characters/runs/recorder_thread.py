@@ -3,10 +3,12 @@
 import os
 import signal
 import threading
+import traceback
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 from actuated_characters.recorder.node import RecorderNode
 from msgs_config.bus.dds import own_context
@@ -39,27 +41,39 @@ class RecorderThread:
             ActuatedCharactersError: a parameter is wrong, the directory cannot be written to, or
                 ROS does not start.
         """
-        self._stop = _Stop()
+        self._arguments = ["--ros-args", "--params-file", str(parameters), *arguments]
+        self._environment = {**environment, **middleware_settings(environment)}
+        self._stop, self._has_begun = _Stop(), threading.Event()
         self._lines = deque[str]()
         self._failure: BaseException | None = None
-        with _variables({**environment, **middleware_settings(environment)}):
-            self._context = own_context("--disable-stdout-logs")
-            ros_arguments = ["--ros-args", "--params-file", str(parameters), *arguments]
-            self._node = RecorderNode(
-                self._lines.append,
-                context=self._context,
-                cli_args=ros_arguments,
-                use_global_arguments=False,
-            )
-        self._thread = threading.Thread(target=self._record, name=self.name, daemon=True)
+        self._thread = threading.Thread(target=self._work, name=self.name, daemon=True)
         self._thread.start()
+        self._has_begun.wait()
+        if self._failure is not None:
+            raise self._failure
 
-    def _record(self) -> None:
-        use_batch_scheduling()  # of this thread alone: on Linux each has a policy of its own
+    def _work(self) -> None:
+        use_batch_scheduling()  # of this thread, and of the middleware's that it starts
         try:
-            self._node.run(self._stop)
+            self._record()
+        except ActuatedCharactersError as error:
+            self._failure = error
         except BaseException as error:
             self._failure = error
+            traceback.print_exc()
+        finally:
+            self._has_begun.set()
+
+    def _record(self) -> None:
+        with ExitStack() as at_end:
+            with _variables(self._environment):  # which the middleware reads as it begins
+                context = own_context("--disable-stdout-logs")
+                at_end.callback(context.try_shutdown)
+                given: dict[str, Any] = {"cli_args": self._arguments, "context": context}
+                node = RecorderNode(self._lines.append, use_global_arguments=False, **given)
+            at_end.callback(node.destroy_node)
+            self._has_begun.set()
+            node.run(self._stop)
 
     @property
     def exit_code(self) -> int | None:
@@ -84,20 +98,19 @@ class RecorderThread:
         del request
         self._stop.set()
         self._thread.join()
-        self._node.destroy_node()
-        self._context.try_shutdown()
-        if not isinstance(self._failure, ActuatedCharactersError | None):
-            raise self._failure
         return int(self._failure is not None)
 
 
 @contextmanager
 def _variables(values: Mapping[str, str]) -> Iterator[None]:
-    """Set the variables of this process' environment, and set them back."""
-    before = dict(os.environ)
+    """Set variables of this process' environment, and set them back."""
+    before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
         yield
     finally:
-        os.environ.clear()
-        os.environ.update(before)
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -35,6 +36,7 @@ _NJIT: Any = numba.njit  # its annotations differ from version to version
 _CONFIG.reload_config()  # where somebody has imported numba before
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _HERE = Path(__file__).parent
+_OURS = re.compile("numba-[0-9a-f]{16}")
 _MONTH_S = 30 * 24 * 3600
 SOURCES = (*_HERE.glob("*.py"), Path(scalars.__file__))
 """All files with functions that are compiled here; a test compares."""
@@ -150,11 +152,12 @@ def _make_directory(directory: Path) -> bool:
     try:
         directory.mkdir(parents=True, exist_ok=True)
         os.utime(directory)
-        for other in directory.parent.glob("numba-*"):
-            if other.stat().st_mtime < time.time() - _MONTH_S:
-                shutil.rmtree(other, ignore_errors=True)
     except OSError:
         return False
+    for other in directory.parent.glob("numba-*"):
+        with suppress(OSError):  # another process may be removing it
+            if _OURS.fullmatch(other.name) and other.stat().st_mtime < time.time() - _MONTH_S:
+                shutil.rmtree(other, ignore_errors=True)
     return os.access(directory, os.W_OK)
 
 

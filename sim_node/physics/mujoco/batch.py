@@ -78,7 +78,7 @@ class MujocoBatch:
         self._first_row = 0
         self._targets, self._velocities = np.zeros((0, positions)), np.zeros((0, size))
         self._pushes: list[tuple[int, int, FloatArray, FloatArray, int, int]] = []
-        self._workers = [self._worker() for _ in range(threads)]
+        self._workers = [self._worker() for _ in range(min(threads, count))]
         self._threads = WorkerThreads(self._workers)
 
     def _worker(self) -> Worker:

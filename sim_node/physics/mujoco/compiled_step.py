@@ -19,7 +19,9 @@ from sim_node.physics import batch
 from sim_node.physics.mujoco.data_layout import DataFields, RawData, data_fields, raw_data
 
 _FOLDER = Path(__file__).parent
-compiled = Compiler(*_FOLDER.glob("compiled_*.py"), _FOLDER / "contacts.py", Path(batch.__file__))
+compiled = Compiler(
+    *_FOLDER.glob("compiled_*.py"), _FOLDER / "data_layout.py", Path(batch.__file__)
+)
 """For all that simulates worlds in one call."""
 
 

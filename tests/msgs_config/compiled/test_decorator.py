@@ -89,13 +89,14 @@ def test_what_is_kept_where_nothing_can_be_written_is_copied(
 
 
 def test_what_was_not_asked_for_in_a_month_goes(tmp_path: Path) -> None:
-    old, recent, other = (tmp_path / name for name in ("numba-old", "numba-recent", "other-old"))
-    for directory in (old, recent, other):
+    old, recent = (tmp_path / f"numba-{digit * 16}" for digit in "0f")
+    others = tmp_path / "numba-0.60.0"  # such as numba's own sources
+    for directory in (old, recent, others):
         directory.mkdir()
         (directory / "code").write_text("code")
-    for directory in (old, other):
+    for directory in (old, others):
         os.utime(directory, (0.0, 0.0))
 
     assert decorator._make_directory(tmp_path / "numba-new")
 
-    assert {each.name for each in tmp_path.iterdir()} == {"numba-new", "numba-recent", "other-old"}
+    assert set(tmp_path.iterdir()) == {tmp_path / "numba-new", recent, others}

@@ -1,5 +1,6 @@
 """Tasks that threads share."""
 
+import os
 import threading
 
 import pytest
@@ -38,4 +39,61 @@ def test_an_error_is_the_callers() -> None:
 
     with pytest.raises(ValueError, match=r"^[01]$"):
         threads.share(2, fail)
+    threads.close()
+
+
+def test_after_an_interruption_nobody_works_any_more() -> None:
+    threads, free = WorkerThreads([0, 1]), threading.Event()
+    begun, ended = list[int](), list[int]()
+
+    def work(own: int, task: int) -> None:
+        begun.append(task)
+        if own == 0:
+            while len(begun) < 2:  # until the other one works, too
+                free.wait(0.001)
+            threading.Timer(0.05, free.set).start()
+            raise KeyboardInterrupt
+        assert free.wait(30.0)
+        ended.append(task)
+
+    with pytest.raises(KeyboardInterrupt):
+        threads.share(100, work)
+
+    assert len(begun) == 2
+    assert len(ended) == 1
+    threads.close()
+
+
+def test_callers_take_turns() -> None:
+    threads, working, most = WorkerThreads([0, 1]), [0, 0], list[int]()
+
+    def work(own: int, task: int) -> None:
+        working[own] += 1
+        most.append(working[own])
+        threading.Event().wait(0.001)
+        working[own] -= 1
+
+    callers = [threading.Thread(target=threads.share, args=(20, work)) for _ in range(3)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    threads.close()
+
+    assert len(most) == 60
+    assert set(most) == {1}
+
+
+def test_the_child_of_a_fork_has_threads_of_its_own() -> None:
+    threads = WorkerThreads([0, 1])
+    threads.share(8, lambda own, task: None)
+
+    child = os.fork()
+    if child == 0:
+        done = list[int]()
+        threads.share(8, lambda own, task: done.append(task))
+        os._exit(sorted(done) != list(range(8)))
+    _, status = os.waitpid(child, 0)
+
+    assert os.waitstatus_to_exitcode(status) == 0
     threads.close()

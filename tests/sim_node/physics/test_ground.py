@@ -11,8 +11,8 @@ from actuated_characters.runs.plan import make_plan
 from benchmarks.tables.ground import depths_below_ground
 from msgs_config.clips.reading import available_clips
 from msgs_config.messages.throw import ProjectileThrow
-from sim_node.physics.bullet.client import pybullet
 from sim_node.physics.settings import STEADY_CONTACTS, WorldSettings
+from tests.support.engines import pybullet
 from tests.support.physics import LoneWorld, advance, box_character, character
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -52,7 +52,7 @@ def fall(whole: Character, seed: int, *, limp: bool, seconds: float, **parameter
             effort = np.zeros(whole.layout.size) if limp else controller.compute_effort(state)
             state = simulation.step(effort)
             speeds.append(float(np.abs(state.velocity).max()))
-    assert min(speeds[-12:]) < 20.0  # it lies there, though a finger may twitch for a tick
+    assert np.median(speeds[-12:]) < 20.0  # it lies there, though a finger may twitch
     return max(speeds)
 
 
