@@ -121,7 +121,10 @@ def test_the_four_curves_are_one_until_the_push(played: StudyResult) -> None:
         before = curves["time_s"] <= 1.0
         errors = np.stack([curve for name, curve in curves.items() if name != "time_s"])
         assert (np.ptp(errors[:, before], axis=0) == 0.0).all()
-        assert np.ptp(errors[:, -1]) > 0.1
+        # A walk without feedback falls, and may whirl until its run ends before the others.
+        last = np.flatnonzero(np.isfinite(errors).all(axis=0))[-1]
+        assert curves["time_s"][last] > 2.5
+        assert np.ptp(errors[:, last]) > 0.1
 
 
 def test_the_study_draws_errors_and_poses(played: StudyResult, runner: InProcessRunner) -> None:

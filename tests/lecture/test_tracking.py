@@ -185,7 +185,7 @@ def test_clearances_are_the_engines_distances_to_the_ground() -> None:
     with world:
         world.body.set_state(position, np.zeros(whole.layout.size))
         client, body = world.body._client, world.body._body
-        ground = 1 - body
+        ground = 0  # the plane, which was loaded first
         pybullet.performCollisionDetection(physicsClientId=client)
         count = pybullet.getNumJoints(body, physicsClientId=client)
         infos = [pybullet.getJointInfo(body, k, physicsClientId=client) for k in range(count)]
@@ -219,13 +219,18 @@ def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert following["small stiffness"][error] > 2.0 * normal[error]
     assert following["large stiffness"][error] < 0.5 * normal[error]
     assert following["large damping"][error] > 2.0 * normal[error]
-    assert all(abs(row[late]) < 30.0 for row in following.values())
-    # without the reference's velocity it lags by what the damping holds back
-    for name in ("normal stiffness", "small damping"):
-        row = table[name, "zero"]
-        assert row[late] == pytest.approx(row[theory], abs=15.0)
-        assert row[error] > following[name][error]
-    assert table["normal stiffness", "zero"][late] > 60.0
+    # efforts at their limits are not those that stable PD counts on: stiff legs that bear the
+    # weight then come to nothing
+    ended = {name for name, row in following.items() if row[late] is None}
+    assert ended <= {"large stiffness"}
+    assert all("diverged" in remark for remark in result.remarks[2:])
+    assert all(abs(row[late]) < 30.0 for name, row in following.items() if name not in ended)
+    # without the reference's velocity it lags by what the damping holds back, and by the weight
+    light, heavy = table["small damping", "zero"], table["normal stiffness", "zero"]
+    assert light[late] == pytest.approx(light[theory], abs=15.0)
+    assert heavy[theory] < heavy[late] < 2.0 * heavy[theory]
+    assert heavy[error] > following["normal stiffness"][error]
+    assert heavy[late] > 60.0
     assert len(runner.cases) == gains.RUNS
     assert set(result.figures) == {"gains", "gains_poses"}
 
