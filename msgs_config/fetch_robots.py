@@ -29,10 +29,20 @@ def main() -> int:
         done = subprocess.run([*pip, *_BUILT_FOR, _WHEEL], check=False)
         if done.returncode == 0:
             (wheel,) = Path(folder).glob("*.whl")
-            with zipfile.ZipFile(wheel) as archive:
-                names = [name for name in archive.namelist() if name.startswith(f"{_PACKAGE}/")]
-                archive.extractall(sysconfig.get_path("purelib"), names)
+            try:
+                _unpack(wheel, Path(sysconfig.get_path("purelib")))
+            except OSError as error:
+                print(f"error: {error}; a virtual environment can be written to", file=sys.stderr)
+                return 1
     return done.returncode
+
+
+def _unpack(wheel: Path, packages: Path) -> None:
+    """Put the package beside the others: all of it or nothing."""
+    with tempfile.TemporaryDirectory(dir=packages) as folder, zipfile.ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if name.startswith(f"{_PACKAGE}/")]
+        archive.extractall(folder, names)
+        (Path(folder) / _PACKAGE).rename(packages / _PACKAGE)
 
 
 if __name__ == "__main__":

@@ -69,7 +69,8 @@ def test_random_starts_are_of_each_environments_own_seed() -> None:
 
 
 def test_a_divergence_ends_one_environment_alone() -> None:
-    environments = TrackVectorEnv(2, clip="walk", action="torques")
+    slow = {"speed_limit": 20.0}  # which the torques pass before it has fallen
+    environments = TrackVectorEnv(2, clip="walk", action="torques", simulator=slow)
     before, _ = environments.reset(options={"start": 0.5})
     actions = np.zeros(environments.action_space.shape or ())
     actions[0] = 1e6
@@ -81,6 +82,7 @@ def test_a_divergence_ends_one_environment_alone() -> None:
 
     assert np.isfinite(before).all()
     assert ended.tolist() == [True, False]
+    assert infos["diverged"].tolist() == [True, False]
     _, rewards, ended, _, infos = environments.step(0.0 * actions)
     assert rewards[0] == 0.0
     assert infos["time"][0] == 0.0
@@ -100,6 +102,18 @@ def test_a_divergence_ends_one_environment_alone() -> None:
 def test_options_are_checked(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ac.ActuatedCharactersError, match=words):
         TrackVectorEnv(**options)
+
+
+def test_a_list_of_seeds_has_one_for_each() -> None:
+    with pytest.raises(ConfigurationError, match=r"seed has 3 entries; it must be 2"):
+        TrackVectorEnv(2, clip="walk").reset(seed=[1, 2, 3])
+
+
+def test_an_episode_begins_at_the_tick_of_its_start() -> None:
+    environments = TrackVectorEnv(1, clip="walk")
+    for tick in (123, 240, 247):
+        _, infos = environments.reset(options={"start": tick / 240})
+        assert infos["reference_time"].tolist() == [tick / 240]
 
 
 def test_actions_are_checked() -> None:

@@ -28,6 +28,7 @@ def asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
     monkeypatch.setattr(subprocess, "run", run)
     monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path / name))
+    (tmp_path / "purelib").mkdir()
     return calls
 
 
@@ -41,6 +42,22 @@ def test_the_robots_alone_are_unpacked_beside_the_other_packages(
     unpacked = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert {str(path.relative_to(tmp_path / "purelib")) for path in unpacked} == set(FILES)
     assert "pybullet==3.2.7" in asked[0] and "--no-deps" in asked[0]
+
+
+def test_where_it_cannot_be_unpacked_is_one_line(
+    tmp_path: Path,
+    asked: list[list[str]],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(fetch_robots, "find_spec", lambda name: None)
+    (tmp_path / "purelib").rmdir()
+
+    assert fetch_robots.main() == 1
+
+    assert len(asked) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ") and str(tmp_path) in line
 
 
 def test_what_is_there_is_not_fetched(asked: list[list[str]]) -> None:

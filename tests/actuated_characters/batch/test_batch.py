@@ -229,6 +229,7 @@ def test_a_world_that_diverges_stays_and_the_others_go_on() -> None:
         ({"simulator": {"engine": "bullet"}}, "'engine' is bullet, which simulates no batch"),
         ({"simulator": {"characters": ["a", "b"]}}, "unknown parameter 'characters'"),
         ({"simulator": {"rate": 100}, "rate": 240}, "must be the same"),
+        ({"simulator": {"initial_velocity": [0.0]}}, "'initial_velocity': worlds begin where"),
         ({"planner": "predictive"}, "'planner' is predictive; in a batch it must be none"),
         ({"behaviour": "ragdoll"}, "'behaviour' is ragdoll; in a batch it must be tracking"),
         ({"law": "pid"}, "'law' is pid; in a batch it must be stable_pd"),
@@ -313,3 +314,14 @@ def test_the_lines_of_the_page_work() -> None:
     exec(code.removeprefix("python"), names)
 
     assert names["batch"].ticks.max() == 240
+
+
+def test_worlds_far_apart_on_the_reference_are_refused() -> None:
+    with Batch(ac.load_character("humanoid"), 2, threads=1, clip="walk") as worlds:
+        worlds.reset([0], at=10**8)
+
+        with pytest.raises(ac.ActuatedCharactersError, match="ticks of the reference apart"):
+            worlds.step()
+
+        worlds.reset([0])
+        worlds.step()
