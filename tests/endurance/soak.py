@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -221,7 +222,9 @@ class _Soak:
 
     def _look_at_memory(self) -> None:
         for name, child in self._started.items():
-            self._found.megabytes.setdefault(name, []).append(private_memory(child))
+            with suppress(FileNotFoundError, ProcessLookupError):  # it has ended by itself, and
+                # this process hears so later; one that ends too early is found by `_check_alive`
+                self._found.megabytes.setdefault(name, []).append(private_memory(child))
 
     def _judge(self) -> None:
         found = self._found
