@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from msgs_config.character.file import read_character_file
+from msgs_config.character.meshes import triangles
 from msgs_config.character.meshes.triangles import read_vertices
 from msgs_config.errors import CharacterError
 from tests.support.engines import Engine, load_urdf, pybullet
@@ -41,6 +42,16 @@ def write_robot(directory: Path, mesh: str, scale: str = "1 1 1") -> Path:
     path = directory / "robot.urdf"
     path.write_text(robot(link("body", inertial() + f"<collision>{shape}</collision>")))
     return path
+
+
+def test_what_engines_are_given_has_the_normals_of_its_triangles(tmp_path: Path) -> None:
+    given = tmp_path / "given.stl"
+    given.write_bytes(triangles._stl_of(write_mesh(tmp_path / "wedge.dae")))
+
+    numbers = np.frombuffer(given.read_bytes()[84:], np.dtype("(12,)<f4, <u2"))["f0"]
+
+    theirs = trimesh.load_mesh(given, process=False).triangles
+    np.testing.assert_allclose(numbers[:, :3], trimesh.triangles.normals(theirs)[0], atol=1e-6)
 
 
 def bounds(points: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
