@@ -9,6 +9,7 @@ from msgs_config.settings import Settings, parameter
 DEFAULT_CHARACTER = "humanoid"
 PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any other is a URDF's path
 FROM_FILE, NO_COLLISIONS = "file", "none"
+LINK_FRICTION = 0.5  # of a simulator's links, unless it is told otherwise
 
 
 class CharacterSource(Settings):

@@ -1,8 +1,9 @@
 """The model of the world that the planner looks ahead in: MuJoCo with ground, contact and limits.
 
 It is built from the same description as everything else. Its law, its passive damping and its soft
-limits are those of controller and simulator (`controller_node.planner.compiled`); contact is
-MuJoCo's, which is not the simulator's, and so what is foreseen is not quite what will be.
+limits are those of controller and simulator (`controller_node.planner.compiled`). Its contacts are
+softer than any world's, so what is foreseen is not quite what will be; or they are those of engine
+MuJoCo's world.
 """
 
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.features import Watched
 from controller_node.planner.compiled.law import Joints
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
+from controller_node.planner.settings import OWN_CONTACTS, PlannerParameters
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Link
 from msgs_config.character.mujoco_model import (
@@ -24,9 +26,12 @@ from msgs_config.character.mujoco_model import (
     geometry,
     quaternion_starts,
 )
+from msgs_config.character.mujoco_world import Contacts, add_character, add_ground, set_options
+from msgs_config.compiled.data_layout import data_fields, raw_data
 from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.soft_limits import SoftLimits, make_soft_limits
+from msgs_config.shared_parameters import LINK_FRICTION
 
 _SOLVER_ITERATIONS = 6
 _CONTACT = (0.015, 3.0)  # time constant in s and damping ratio: what lands stays, as in the world
@@ -45,12 +50,20 @@ class ContactModel:
     """
 
     def __init__(
-        self, character: Character, *, period_s: float, gravity: float, friction: float
+        self,
+        character: Character,
+        *,
+        period_s: float,
+        gravity: float,
+        friction: float,
+        contact: str = OWN_CONTACTS,
     ) -> None:
         """Build the model; `friction` is that of a contact, the product of both surfaces'."""
         self._character = character
         self._period_s = period_s
-        self._model = _compile(character, period_s, gravity, friction)
+        self._has_own_contacts = contact == OWN_CONTACTS
+        compile_model = _compile if self._has_own_contacts else _compile_world
+        self._model = compile_model(character, period_s, gravity, friction)
         self._data: list[mujoco.MjData] = []
         self._identity = np.zeros(self._model.nq)
         self._identity[quaternion_starts(self._model)] = 1.0
@@ -67,6 +80,17 @@ class ContactModel:
         )
         self._joints = self._find_joints()
         self._limits = self._find_limits()
+
+    @classmethod
+    def of(cls, character: Character, given: PlannerParameters) -> "ContactModel":
+        """The model that a planner's parameters say."""
+        return cls(
+            character,
+            period_s=1.0 / given.rate_hz,
+            gravity=given.gravity,
+            friction=given.friction,
+            contact=given.contact,
+        )
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -104,7 +128,8 @@ class ContactModel:
             layout.vector_lengths,
         )
         watched = Watched(np.array(self.end_effectors, dtype=np.intp) + 1, self._character.mass)
-        return RolloutModel(self._tree, self._joints, self._limits, law, watched)
+        own = self._has_own_contacts
+        return RolloutModel(self._tree, self._joints, self._limits, law, watched, own)
 
     def engine(self) -> EngineBuffers:
         """Something that simulates it, for one thread."""
@@ -123,6 +148,9 @@ class ContactModel:
             MassMatrix(model, law._address, law.M),
             data.xpos,
             data.subtree_com,
+            data.qacc_smooth,
+            data_fields(),
+            raw_data(data),
         )
 
     def _find_joints(self) -> Joints:
@@ -179,6 +207,19 @@ def _compile(
         pair = spec.add_pair(geomname1=one, geomname2=other)
         pair.condim, pair.solref = 3, _CONTACT
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
+    return compile_for_contacts(spec, character.links)
+
+
+def _compile_world(
+    character: Character, period_s: float, gravity: float, friction: float
+) -> mujoco.MjModel:
+    """As engine MuJoCo has it with its defaults, where a step is a tick."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False  # limits are in rad
+    contacts = Contacts(period_s, friction, LINK_FRICTION * LINK_FRICTION)
+    set_options(spec.option, contacts, gravity)
+    add_ground(spec, contacts)
+    add_character(spec, "", character, contacts)
     return compile_for_contacts(spec, character.links)
 
 

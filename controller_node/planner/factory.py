@@ -80,10 +80,5 @@ def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlig
     from controller_node.planner.commands_in_flight import CommandsInFlight
     from controller_node.planner.contact_model import ContactModel
 
-    model = ContactModel(
-        character,
-        period_s=1.0 / given.rate_hz,
-        gravity=given.gravity,
-        friction=given.friction,
-    )
+    model = ContactModel.of(character, given)
     return CommandsInFlight(character, model, given.delay)

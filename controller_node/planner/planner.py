@@ -81,12 +81,7 @@ class PredictivePlanner:
         """
         self._made_of = (character, settings)
         self.settings, given = settings, settings.parameters
-        self._model = ContactModel(
-            character,
-            period_s=1.0 / given.rate_hz,
-            gravity=given.gravity,
-            friction=given.friction,
-        )
+        self._model = ContactModel.of(character, given)
         self._rollouts = RolloutPool(self._model, given.threads)
         self.in_flight = (
             CommandsInFlight(character, self._model, given.delay) if given.delay else None

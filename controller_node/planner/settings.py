@@ -18,6 +18,9 @@ NO_PLANNER = "none"
 PREDICTIVE = "predictive"
 RECORDED = "recorded"
 
+OWN_CONTACTS = "own"
+WORLD_CONTACTS = "world"
+
 PLANNING_DELAY = "planning_delay_ticks"
 
 
@@ -81,6 +84,12 @@ class PlannerParameters(Settings, prefix="plan."):
     )
     seed: int = parameter(0, "of the samples", maximum=2**53)
     friction: float = parameter(0.38, "of contacts as foreseen; a margin against slips", maximum=10)
+    contact: str = parameter(
+        OWN_CONTACTS,
+        "contacts as foreseen: the planner's own, which are softer than any engine's, or those of "
+        "engine mujoco's world",
+        choices=(OWN_CONTACTS, WORLD_CONTACTS),
+    )
     planning_delay: int = parameter(
         0,
         "from the state that a plan is made from to the first tick in which it acts; meanwhile the "

@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
 from numba import types
 
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.compiled import mujoco_functions as mj
+from msgs_config.compiled.data_layout import DataFields, RawData
 from msgs_config.compiled.decorator import compiled
 
 _FREELY = 10.0  # m/s^2, about gravity: more than what slides by its own weight can get
@@ -52,3 +55,33 @@ def ask_for_friction(
     for number in range(len(rows)):
         if rows[number] >= 0:  # else apart, or between what cannot move
             ask_of_contact(rows[number], friction[number, 0], reference, smooth)
+
+
+@compiled.inlined
+def set_friction(
+    model: int, data: int, acceleration: FloatArray, fields: DataFields, raw: RawData
+) -> None:
+    """Have MuJoCo's contacts ask for friction as `ask_for_friction` says.
+
+    To be called after the acceleration (n,) without constraints was found, and before constraints
+    are solved.
+
+    Args:
+        model: MuJoCo's model, by its address.
+        data: MuJoCo's data, by its address.
+        acceleration: The data's, `qacc_smooth`.
+        fields: Where fields are.
+        raw: The data's memory.
+    """
+    contacts = raw.numbers[fields.contacts]
+    if contacts == 0:
+        return
+    smooth = np.empty(raw.numbers[fields.rows])
+    mj.apply_jacobian(model, data, smooth.ctypes.data, acceleration.ctypes.data)
+    start = (raw.words[fields.contact_pointer] - raw.arena_start) // 8
+    reference = raw.arena[(raw.words[fields.reference_pointer] - raw.arena_start) // 8 :]
+    for number in range(contacts):
+        first = start + number * fields.contact_words
+        row = raw.arena_numbers[2 * first + fields.constraint]
+        if row >= 0:  # else apart, or between what cannot move
+            ask_of_contact(row, raw.arena[first + fields.friction], reference, smooth)

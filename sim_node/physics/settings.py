@@ -2,7 +2,7 @@
 
 from msgs_config.character.model import UrdfOptions
 from msgs_config.settings import Settings, parameter, shared
-from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
+from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, LINK_FRICTION, PLANE, RATE
 from sim_node.physics.engine import DEFAULT_ENGINE, ENGINES
 
 STEADY_CONTACTS = {"contact_breaking_threshold": 0.1}
@@ -24,7 +24,9 @@ class WorldSettings(Settings):
         maximum=100.0,
         at_reset=True,
     )
-    link_friction: float = parameter(0.5, "friction of every link", maximum=100.0, at_reset=True)
+    link_friction: float = parameter(
+        LINK_FRICTION, "friction of every link", maximum=100.0, at_reset=True
+    )
     solver_iterations: int = parameter(
         10, "contact solver iterations a step", minimum=1, maximum=1000, at_reset=True
     )

@@ -26,11 +26,12 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
     "mujoco": {
         "msgs_config/character/dynamics.py",
         "msgs_config/character/mujoco_model.py",
+        "msgs_config/character/mujoco_world.py",
+        "msgs_config/compiled/data_layout.py",
         "msgs_config/compiled/mujoco_functions.py",
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("balls", "body", "contacts")),
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("model", "part", "world")),
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("batch", "compiled_step")),
-        "sim_node/physics/mujoco/data_layout.py",
         "controller_node/planner/contact_model.py",
     },
 }

@@ -10,10 +10,12 @@ from controller_node.planner.compiled.features import Watched, write_features
 from controller_node.planner.compiled.law import Joints, Room, add_errors, stable_pd
 from controller_node.references.offsets import knot_before
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled import mujoco_functions as mj
 from msgs_config.compiled.borrowed import borrow
+from msgs_config.compiled.data_layout import DataFields, RawData
+from msgs_config.compiled.friction import set_friction
 from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
-from msgs_config.compiled.mujoco_functions import step_after_forces, step_before_forces
 from msgs_config.compiled.soft_limits import (
     PassedBounds,
     SoftLimits,
@@ -42,6 +44,9 @@ class EngineBuffers(NamedTuple):
     law_mass: MassMatrix  # the mass matrix with the law's damping over a period
     points: FloatArray  # (bodies, 3) m, origins of the links
     centres: FloatArray  # (bodies, 3) m, centres of mass of what each body carries
+    smooth: FloatArray  # (n,) acceleration without constraints
+    fields: DataFields
+    raw: RawData
 
 
 class RolloutModel(NamedTuple):
@@ -52,6 +57,7 @@ class RolloutModel(NamedTuple):
     limits: SoftLimits
     law: LawGains
     watched: Watched
+    has_own_contacts: bool  # else those of engine MuJoCo
 
 
 class Desired(NamedTuple):
@@ -94,7 +100,7 @@ def roll_out(
     _begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1
     for tick in range(ticks + 1):
-        step_before_forces(engine.model, engine.data)
+        mj.step_before_forces(engine.model, engine.data)
         check, since_check = divmod(tick, desired.check_ticks)
         if check and not since_check:
             _write_check(features[check - 1], desired.positions[tick], body, engine)
@@ -104,7 +110,7 @@ def roll_out(
             _apply(target, target_velocity, body, engine, room, bounds)
             if not _is_bounded(engine):
                 return False  # before MuJoCo writes a warning
-            step_after_forces(engine.model, engine.data)
+            _step_after_forces(body, engine)
     return _is_bounded(engine)
 
 
@@ -123,13 +129,26 @@ def let_act(
     bounds = _room_for_bounds(_MOST_BOUNDS, len(start_velocity))
     _begin(start_position, start_velocity, engine)
     for tick in range(len(efforts)):
-        step_before_forces(engine.model, engine.data)
+        mj.step_before_forces(engine.model, engine.data)
         engine.applied[:] = efforts[tick]
         _add_passive(body, engine, bounds)
         if not _is_bounded(engine):
             return False  # before MuJoCo writes a warning
-        step_after_forces(engine.model, engine.data)
+        _step_after_forces(body, engine)
     return _is_bounded(engine)
+
+
+@compiled
+def _step_after_forces(body: RolloutModel, engine: EngineBuffers) -> None:
+    """The rest of a tick, with the applied forces."""
+    model, data = engine.model, engine.data
+    if body.has_own_contacts:
+        mj.step_after_forces(model, data)
+    else:
+        mj.find_free_acceleration(model, data)
+        set_friction(model, data, engine.smooth, engine.fields, engine.raw)
+        mj.solve_constraints(model, data)
+        mj.advance_explicitly(model, data)
 
 
 @compiled
@@ -221,5 +240,5 @@ def features_of(
     """Write the features (f,) of a state against itself: those of a reference."""
     engine.position[:] = position
     engine.velocity[:] = velocity
-    step_before_forces(engine.model, engine.data)
+    mj.step_before_forces(engine.model, engine.data)
     _write_check(row, position, body, engine)

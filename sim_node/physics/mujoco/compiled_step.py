@@ -13,15 +13,12 @@ import numpy as np
 
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.compiled import mujoco_functions as mj
+from msgs_config.compiled.data_layout import DataFields, RawData, data_fields, raw_data
 from msgs_config.compiled.decorator import Compiler
-from msgs_config.compiled.friction import ask_of_contact
+from msgs_config.compiled.friction import set_friction
 from sim_node.physics import batch
-from sim_node.physics.mujoco.data_layout import DataFields, RawData, data_fields, raw_data
 
-_FOLDER = Path(__file__).parent
-compiled = Compiler(
-    *_FOLDER.glob("compiled_*.py"), _FOLDER / "data_layout.py", Path(batch.__file__)
-)
+compiled = Compiler(*Path(__file__).parent.glob("compiled_*.py"), Path(batch.__file__))
 """For all that simulates worlds in one call."""
 
 
@@ -98,7 +95,7 @@ def step(world: int, tick: int, pushes: Pushes, buffers: StepBuffers) -> bool:
         if pushes.first_ticks[push] <= tick < pushes.last_ticks[push]:
             _apply(push, pushes, buffers)
     mj.find_free_acceleration(model, data)
-    _set_friction(buffers)
+    set_friction(model, data, buffers.smooth, buffers.fields, buffers.raw)
     mj.solve_constraints(model, data)
     buffers.before[:] = buffers.position
     mj.advance_explicitly(model, data)
@@ -115,25 +112,6 @@ def _has_room(buffers: StepBuffers) -> bool:
         has_room &= buffers.raw.numbers[warning] == 0
         buffers.raw.numbers[warning] = 0
     return has_room
-
-
-@compiled.inlined
-def _set_friction(buffers: StepBuffers) -> None:
-    """See `set_friction`."""
-    raw, fields = buffers.raw, buffers.fields
-    contacts = raw.numbers[fields.contacts]
-    if contacts == 0:
-        return
-    smooth = np.empty(raw.numbers[fields.rows])
-    out, acceleration = smooth.ctypes.data, buffers.smooth.ctypes.data
-    mj.apply_jacobian(buffers.model, buffers.data, out, acceleration)
-    start = (raw.words[fields.contact_pointer] - raw.arena_start) // 8
-    reference = raw.arena[(raw.words[fields.reference_pointer] - raw.arena_start) // 8 :]
-    for number in range(contacts):
-        first = start + number * fields.contact_words
-        row = raw.arena_numbers[2 * first + fields.constraint]
-        if row >= 0:  # else apart, or between what cannot move
-            ask_of_contact(row, raw.arena[first + fields.friction], reference, smooth)
 
 
 @compiled.inlined

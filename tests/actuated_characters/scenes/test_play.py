@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 SIDES = ("left", "right")
 RATE = 240
-DURATION = 12  # s: each falls, and gets up again
+DURATION = 18  # s: each falls, and gets up again
 TICKS = 2 * RATE  # with the first strike, and the first fall
 LONG = 120.0  # s that a run may take
 FALLEN, UP = 0.3, 0.75  # m, of a root: on the ground, on two legs

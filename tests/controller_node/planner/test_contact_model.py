@@ -10,7 +10,7 @@ from controller_node.control_laws import GainArrays, stable_pd_effort
 from controller_node.parameters import make_controller_settings, resolve_for
 from controller_node.planner.compiled import linear
 from controller_node.planner.compiled.draws import normal_draws
-from controller_node.planner.compiled.rollout import Desired, RolloutModel
+from controller_node.planner.compiled.rollout import Desired, RolloutModel, let_act
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.search.rollout_pool import RolloutPool
 from controller_node.references.base import ReferenceState
@@ -21,8 +21,9 @@ from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.clips.reading import read_clip
 from msgs_config.compiled import mass_matrix, soft_limits
 from msgs_config.geometry import rotations
+from msgs_config.messages.state import StampedState
 from sim_node.physics.passive_forces import PassiveForces
-from tests.support.physics import character
+from tests.support.physics import character, simulation
 
 RATE = 240
 PERIOD = 1.0 / RATE
@@ -333,3 +334,27 @@ def test_contacts_are_scaled_by_what_the_links_weigh() -> None:
         gained = np.diag(jacobian @ inverse @ jacobian.T).reshape(2, 3).mean(axis=1)
 
         np.testing.assert_allclose(MODEL.model.body_invweight0[index + 1], gained, rtol=1e-6)
+
+
+def test_the_worlds_contacts_are_those_of_engine_mujoco() -> None:
+    # Arrange: thrown down, so that it lands on its feet, slides and falls
+    rng, ticks = np.random.default_rng(3), 60
+    world = simulation("humanoid", engine="mujoco")
+    position = world.state.position.copy()
+    velocity = np.array([1.5, 0.5, -2.0, *rng.normal(size=N - 3)])
+    efforts = 3.0 * rng.normal(size=(ticks, N)) * (np.arange(N) >= 6)
+    world.begin_in({world.simulated.setup.name: StampedState(0, position, velocity, np.zeros(N))})
+    model = ContactModel(HUMANOID, period_s=PERIOD, gravity=9.81, friction=0.45, contact="world")
+    engine, body = model.engine(), model.body(gains())
+
+    # Act
+    went_well = let_act(model.position_of(position), velocity, efforts, body, engine)
+    for effort in efforts:
+        world.advance(effort)
+
+    # Assert: what is left is of rotations that the messages round
+    foreseen = model.message_position(engine.position)
+    assert went_well
+    assert np.abs(velocity - engine.velocity).max() > 10.0  # it has met the ground
+    np.testing.assert_allclose(foreseen, world.state.position, atol=1e-7)
+    np.testing.assert_allclose(engine.velocity, world.state.velocity, atol=1e-5)
