@@ -95,7 +95,8 @@ class CharacterTimeline:
         self.modes: list[ModeChange] = []
         self.plans: dict[int, PlanArrays] = {}  # by stamp
         self.pushes_sent = 0
-        self._amid: list[tuple[bytes, int]] = []  # states before the first one of an episode
+        # states before the first one of an episode: stamp, message, when it was published
+        self._amid: list[tuple[int, bytes, int]] = []
         self.begins_amid = False  # its first state is in the middle of an episode
         self._controller_text = ""
         self._early: list[tuple[str, bytes, int]] = []
@@ -131,7 +132,9 @@ class CharacterTimeline:
     def finish(self) -> Rebuilt:
         """Check that there are states of each tick; return their character.
 
-        Where no episode begins they are those of the middle of one, from which nothing follows.
+        Where no episode begins, nor a keyframe came before its state, they begin with the first one
+        of a keyframe that came behind it; else they are those of the middle of an episode, from
+        which nothing follows.
 
         Raises:
             RecordingError: there are none, or not all of them.
@@ -139,8 +142,12 @@ class CharacterTimeline:
         if not self.states.stamps_ns and not self._amid:
             raise RecordingError(f"no states, nothing on '{topics.JOINT_STATES.name}'")
         if not self.states.stamps_ns:
-            self.begins_amid, amid, self._amid = True, self._amid, []
-            for raw, published_ns in amid:
+            amid, keyframes = self._amid, self._begins.keyframes
+            begins = (row for row, (stamp_ns, *_) in enumerate(amid) if stamp_ns in keyframes)
+            first = next(begins, -1)
+            self.begins_amid = first < 0
+            self._amid = amid[: max(first, 0)]
+            for _, raw, published_ns in amid[max(first, 0) :]:
                 self._take_state(raw, published_ns)
         if self.gaps:
             ranges = [f"{a} to {b}" if b > a else f"{a}" for a, b in self.gaps[:_MOST_NAMED]]
@@ -182,7 +189,7 @@ class CharacterTimeline:
                 return
             is_begin = state.effort is None or state.stamp_ns in self._begins.keyframes
             if not is_begin and not self.begins_amid:
-                self._amid.append((raw, published_ns))
+                self._amid.append((state.stamp_ns, raw, published_ns))
                 return
         elif tick <= self._last_tick:
             self.repeated += 1

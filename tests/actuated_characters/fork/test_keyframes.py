@@ -251,6 +251,25 @@ def test_a_keyframe_may_come_behind_its_state(walk: Path, tmp_path: Path) -> Non
     assert len(recording.stamps_ns) == round(0.3 * 240) + 1
 
 
+def test_a_bag_of_the_last_part_begins_with_a_keyframe_that_came_behind_its_state(
+    walk: Path, tmp_path: Path
+) -> None:
+    messages = list(read_messages(walk / BAG))
+    latched = {"/sim_node/configuration", "/controller_node/configuration"}
+    states = [n for n, each in enumerate(messages) if each.topic == "/joint_states"]
+    kept = [each for n, each in enumerate(messages) if n >= states[60] or each.topic in latched]
+    kept.sort(key=lambda each: each.topic == "/sim_node/keyframe")  # behind all else
+
+    write_in_order(tmp_path / "run" / BAG, kept)
+    recording = read_recording(tmp_path / "run")
+
+    assert recording.keyframe is not None
+    assert not recording.begins_amid
+    assert recording.skipped_states == 60  # 0.5 s are 120 ticks
+    assert_ends_alike(recording, read_recording(walk))
+    assert replay(read_recordings(tmp_path / "run")).state_hashes
+
+
 def write_in_order(bag: Path, messages: list[RecordedMessage]) -> None:
     """Write messages into a bag one after another."""
     bag.parent.mkdir()
