@@ -15,7 +15,7 @@ from benchmarks.support.ratios import Ratio
 from msgs_config.messages import topics
 
 CHARACTER, RATE = "humanoid", 1000  # Hz
-_DURATION = 6.0  # s of simulated time of one run
+_DURATION = 20.0  # s of simulated time of one run: several of the reports, one a second
 _REAL_TIME_DURATION = 10.0  # s
 _PAIRS = 5  # pairs of runs with and without a recorder
 
