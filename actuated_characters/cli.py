@@ -6,6 +6,10 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_streams
+
+limit_threads()  # before anything imports numpy
+
 from actuated_characters.commands.common.completion import add_names, complete
 from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
 from actuated_characters.commands.common.overview import print_overview
@@ -21,7 +25,6 @@ from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
-from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_streams
 from msgs_config.runtime.ros_environment import check_domain_id
 
 _EXIT_INTERRUPTED = 130
@@ -31,7 +34,6 @@ _RUN = "run"  # this command alone prints the overview
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     open_missing_streams()
-    limit_threads()
     raise_at_signals()
     try:
         parser = _parser()

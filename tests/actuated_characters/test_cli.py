@@ -24,6 +24,20 @@ def test_the_version_names_what_the_last_bits_depend_on(capsys: pytest.CaptureFi
     assert {"actuated_characters", "pybullet", "mujoco-core", "numpy", "libc"} <= names
 
 
+def test_the_command_has_numpy_on_one_thread() -> None:
+    given = {name: value for name, value in os.environ.items() if not name.endswith("_THREADS")}
+    script = (
+        "import os, actuated_characters.cli, numpy; one = numpy.ones((500, 500)); one @ one;"
+        "print(len(os.listdir('/proc/self/task')))"
+    )
+
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, env=given, check=True
+    )
+
+    assert done.stdout.strip() == "1", done.stdout
+
+
 def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--parameters", "controller_node", "--character", "pendulum"]) == 0
 
