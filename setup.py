@@ -33,6 +33,7 @@ setup(
         "controller_node": [
             "references/data/*.yaml",
             "behaviours/state_machine/data/*.yaml",
+            "planner/policy/shipped/*.npz",
         ],
         "actuated_characters": ["scenes/data/*.yaml"],
     },

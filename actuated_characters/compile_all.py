@@ -16,11 +16,12 @@ _SIZE = (64, 48)  # pixels
 def main() -> None:
     """Plan a few ticks of a walk in a world of each engine, and draw the last one."""
     clip = {"reference": "clip", "clip": "walk"}
-    planner = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
+    predictive = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
     for engine in INSTALLED_ENGINES:
         simulator = {"engine": engine, "command_delay_ticks": 1}
-        plan = make_plan("humanoid", 0.05, clip, simulator, planner)
-        *_, last = ticks_in_process(plan)
+        for planner in (predictive, {"planner": "policy"}):
+            plan = make_plan("humanoid", 0.05, clip, simulator, planner)
+            *_, last = ticks_in_process(plan)
     Renderer(plan.character).picture(FrameSpec(last.following.position), _SIZE)
     with Batch(plan.character, 1, threads=1, clip="walk") as batch:
         batch.step()

@@ -93,7 +93,8 @@ class Controller:
     @property
     def parts(self) -> tuple[object, ...]:
         """What it is made of, and does not change."""
-        return self._character, self._own_reference, self._choice, self._model
+        planned = () if self.planner is None else self.planner.parts
+        return self._character, self._own_reference, self._choice, self._model, *planned
 
     @property
     def episode_ns(self) -> int:

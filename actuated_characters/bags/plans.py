@@ -53,6 +53,6 @@ def decode_plan(raw: bytes) -> PlanArrays:
     times, *centre, costs, alternatives = (
         points[name].astype(float) for name in ("time", "x", "y", "z", "cost", "alternative")
     )
-    if not (np.isfinite(times).all() and (np.diff(times, prepend=0.0) > 0.0).all()):
+    if not (np.isfinite(times).all() and times[0] >= 0.0 and (np.diff(times) > 0.0).all()):
         raise MessageError("a plan whose times do not increase from 0 on")
     return PlanArrays(typed.stamp_of(message), times, np.stack(centre, axis=1), costs, alternatives)

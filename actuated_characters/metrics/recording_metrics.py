@@ -127,6 +127,7 @@ def plan_errors(recording: Recording) -> dict[float, FloatArray]:
         first = int(np.searchsorted(recording.stamps_ns, plan.stamp_ns))
         ticks = np.round(plan.times * rate).astype(np.intp)
         within = first + ticks < ends[np.searchsorted(ends, first, side="right")]
+        within &= ticks > 0  # a policy says no more than where the character is
         ahead.append(ticks[within])
         rows.append(first + ticks[within])
         predicted.append(plan.centres[within])

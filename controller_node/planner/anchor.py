@@ -8,22 +8,13 @@ and stays there until the reference goes on.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.planner.compiled.anchoring import advance_anchor
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
-
-_PERTURBED_AT = 0.28  # m from the reference's centre of mass at which it is perturbed
-_FAST = 0.8  # m/s off the reference at which it is perturbed; an unpushed walk reaches 0.63
-_PERTURBED_SECONDS = 1.0  # s that it stays perturbed, and that the reference counts as just stopped
-_FOLLOWS_IN = 0.3  # s, time constant with which the place gives way
-_TURNS_IN = 1.0  # s, time constant with which the heading gives way
-_RETURNS_IN = 3.0  # s, time constant of place and heading on the way back
-_TRAVELS = 0.02  # m/s of the reference's centre of mass from which on it goes somewhere
-_TURNS = 0.02  # rad/s of the reference's root about z from which on it goes somewhere
-_RETURN_SPEED = 0.15  # m/s, at most, of the place on the way back
 
 
 @dataclass(frozen=True)
@@ -81,33 +72,22 @@ class Anchor:
             time: s since the episode began.
             elapsed: s since the last look.
         """
-        error = state.centre - wanted.centre
-        far = _length(error) > _PERTURBED_AT or _length(state.velocity - wanted.velocity) > _FAST
-        travels = _length(wanted.velocity) > _TRAVELS or abs(wanted.turn) > _TURNS
-        calm_from = time + _PERTURBED_SECONDS if far else self.calm_from
-        settled_from = time + _PERTURBED_SECONDS if travels else self.settled_from
-        anchor = replace(self, calm_from=calm_from, settled_from=settled_from)
-        if anchor.is_perturbed(time) or (not travels and time < settled_from):
-            anchor = anchor._followed(state, wanted, elapsed)
-        return anchor._returned(wanted.centre, elapsed) if travels else anchor
-
-    def _followed(self, state: PlanarState, wanted: PlanarState, elapsed: float) -> "Anchor":
-        """A part of the way to the character."""
-        yaw = self.yaw + min(elapsed / _TURNS_IN, 1.0) * _heading(state.root, wanted.root)
-        before = _turn(self.yaw) * state.centre + self.place
-        share = min(elapsed / _FOLLOWS_IN, 1.0)
-        place = before - _turn(yaw) * (state.centre - share * (state.centre - wanted.centre))
-        return replace(self, place=place, yaw=yaw)
-
-    def _returned(self, centre: complex, elapsed: float) -> "Anchor":
-        """A part of the way back, as seen where the reference's centre of mass is."""
-        away = _turn(self.yaw) * centre + self.place - centre
-        share = min(elapsed / _RETURNS_IN, 1.0)
-        yaw = (1.0 - share) * self.yaw
-        if share * _length(away) > _RETURN_SPEED * elapsed:
-            share = _RETURN_SPEED * elapsed / _length(away)
-        place = centre + (1.0 - share) * away - _turn(yaw) * centre
-        return replace(self, place=place, yaw=yaw)
+        return Anchor(
+            *advance_anchor(
+                self.place,
+                self.yaw,
+                self.calm_from,
+                self.settled_from,
+                state.centre,
+                state.velocity,
+                _heading(state.root, wanted.root),
+                wanted.centre,
+                wanted.velocity,
+                wanted.turn,
+                time,
+                elapsed,
+            )
+        )
 
 
 def planar_state(
@@ -136,10 +116,6 @@ def _heading(root: FloatArray, wanted: FloatArray) -> float:
 
 def _turn(angle: float) -> complex:
     return complex(math.cos(angle), math.sin(angle))
-
-
-def _length(number: complex) -> float:
-    return math.sqrt(number.real * number.real + number.imag * number.imag)
 
 
 def _pair(number: complex) -> FloatArray:

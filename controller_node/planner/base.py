@@ -23,6 +23,10 @@ class Planner(Protocol):
     def in_flight(self) -> "CommandsInFlight | None":
         """The commands that have not acted yet; None where they act at once."""
 
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """What is large in it and does not change: a keyframe goes without."""
+
     def while_waiting(self, act: Callable[[], None]) -> None:
         """Have something done again and again while it waits for a plan."""
 

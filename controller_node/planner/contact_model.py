@@ -31,6 +31,7 @@ from msgs_config.compiled.data_layout import data_fields, raw_data
 from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
 from msgs_config.compiled.soft_limits import SoftLimits, make_soft_limits
+from msgs_config.geometry import rotations
 from msgs_config.shared_parameters import LINK_FRICTION
 
 _SOLVER_ITERATIONS = 6
@@ -72,6 +73,8 @@ class ContactModel:
             index for index in range(len(character.links)) if index not in parents
         ]
         """Links that carry no other, as indices of `Character.links`."""
+        self.left = _left_axis(character)
+        """The root's axis (3,), in its frame, that points to the left while it stands."""
         self._tree = Tree(
             self._model.M_rowadr.astype(np.intp),
             self._model.M_rownnz.astype(np.intp),
@@ -176,6 +179,14 @@ class ContactModel:
             [joint.qposadr[0] for joint, _ in limited],
             [joint.dofadr[0] for joint, _ in limited],
         )
+
+
+def _left_axis(character: Character) -> FloatArray:
+    """By the rest pose, which faces along x where no placement has turned it."""
+    standing = rotations.exp(np.array(character.rest_position[3:6]))
+    upright = rotations.multiply(rotations.about_z(-character.placement.yaw), standing)
+    left: FloatArray = rotations.rotate(rotations.conjugate(upright), np.array((0.0, 1.0, 0.0)))
+    return left
 
 
 def _compile(

@@ -6,6 +6,7 @@ from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import (
     NO_PLANNER,
+    POLICY,
     RECORDED,
     PlannerParameters,
     check_planner,
@@ -21,6 +22,7 @@ from msgs_config.parameters import Values
 
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
+    from controller_node.planner.policy.file import Policy
 
 
 def check_planning(character: Character, values: Values) -> None:
@@ -31,6 +33,8 @@ def check_planning(character: Character, values: Values) -> None:
     check_planner(character, name)
     if name == RECORDED:
         _recorded_plan(character, values)
+    elif name == POLICY:
+        _read_policy(character, values)
     else:
         make_planner_settings(character, values)
 
@@ -46,13 +50,50 @@ def make_planner(character: Character, values: Values) -> Planner | None:
     if name == NO_PLANNER:
         return None
     check_planner(character, name)
+    given = PlannerParameters.of(values)
     if name == RECORDED:
         plan = _recorded_plan(character, values)
-        return RecordedPlanner(plan, _commands_in_flight(character, values))
+        return RecordedPlanner(plan, make_commands_in_flight(character, given))
+    if name == POLICY:
+        policy = _read_policy(character, values)
+        from controller_node.planner.policy.planner import PolicyPlanner
+
+        return PolicyPlanner(character, policy, given, make_commands_in_flight(character, given))
     settings = make_planner_settings(character, values)
     from controller_node.planner.planner import PredictivePlanner  # compiled code, for it alone
 
     return PredictivePlanner(character, settings)
+
+
+def _read_policy(character: Character, values: Values) -> "Policy":
+    """The policy that the parameters' values say, at this controller's rate.
+
+    Without a name it is the shipped one of the clip that is tracked.
+    """
+    from controller_node.planner.policy.file import read_policy, shipped_policies
+
+    given, name = PlannerParameters.of(values), PlannerParameters.of(values).policy
+    if not name and MotionSettings.of(values).reference == "clip":
+        clip = ClipSettings.of(values).clip
+        name = clip if clip in shipped_policies() else name
+    policy = read_policy(name, character)
+    if policy.rate_hz != given.rate_hz:
+        raise ConfigurationError(
+            f"parameter 'rate' is {given.rate_hz}; the policy '{name}' is for {policy.rate_hz}"
+        )
+    return policy
+
+
+def make_commands_in_flight(
+    character: Character, given: PlannerParameters
+) -> "CommandsInFlight | None":
+    """The commands on their way, where they take a tick or more."""
+    if not given.delay:
+        return None
+    from controller_node.planner.commands_in_flight import CommandsInFlight
+    from controller_node.planner.contact_model import ContactModel
+
+    return CommandsInFlight(character, ContactModel.of(character, given), given.delay)
 
 
 def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
@@ -70,15 +111,3 @@ def _recorded_plan(character: Character, values: Values) -> RecordedPlan:
             f"parameter 'rate' is {rate}; the plan in {clip} is for {plan.rate_hz}"
         )
     return plan
-
-
-def _commands_in_flight(character: Character, values: Values) -> "CommandsInFlight | None":
-    """The commands on their way, where they take a tick or more."""
-    given = PlannerParameters.of(values)
-    if not given.delay:
-        return None
-    from controller_node.planner.commands_in_flight import CommandsInFlight
-    from controller_node.planner.contact_model import ContactModel
-
-    model = ContactModel.of(character, given)
-    return CommandsInFlight(character, model, given.delay)

@@ -113,6 +113,11 @@ class PredictivePlanner:
         """What is expected of the plan in force, the same object as long as it is."""
         return None if self._plan is None else self._plan.outlook
 
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """Nothing that is large and does not change."""
+        return ()
+
     def while_waiting(self, act: Callable[[], None]) -> None:
         """Have something done again and again while it waits for a plan."""
         self._act = act

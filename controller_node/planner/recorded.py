@@ -25,6 +25,11 @@ class RecordedPlanner:
         self._plan = plan
         self.in_flight = in_flight
 
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """What is large in it and does not change."""
+        return (self._plan,)
+
     def while_waiting(self, act: Callable[[], None]) -> None:
         """It waits for no plan."""
 

@@ -17,6 +17,7 @@ from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
 NO_PLANNER = "none"
 PREDICTIVE = "predictive"
 RECORDED = "recorded"
+POLICY = "policy"
 
 OWN_CONTACTS = "own"
 WORLD_CONTACTS = "world"
@@ -57,9 +58,16 @@ class PlannerParameters(Settings, prefix="plan."):
     planner: str = parameter(
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
-        "model of the world, or the plan that is in the clip's file (of `motion reconstruct`)",
+        "model of the world, the plan that is in the clip's file (of `motion reconstruct`), or a "
+        "trained policy",
         name="planner",
-        choices=(NO_PLANNER, PREDICTIVE, RECORDED),
+        choices=(NO_PLANNER, PREDICTIVE, RECORDED, POLICY),
+    )
+    policy: str = parameter(
+        "",
+        "of planner policy: a shipped policy's name, or a file of `train`; empty: the one that is "
+        "shipped for the clip",
+        name="policy",
     )
     horizon: float = parameter(0.8, "how far it looks", unit="s", minimum=0.05, maximum=5.0)
     period: float = parameter(0.05, "from one plan to the next", unit="s", minimum=1e-3, maximum=1)

@@ -95,6 +95,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "clips": _clips,
     "cycles": _cycles,
     "reconstructed.json": _copy_of("tests/data/walk_reconstructed.json"),
+    "trained.npz": _copy_of("controller_node/planner/policy/shipped/walk.npz"),
     "robot.urdf": _robot,
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),

@@ -59,8 +59,9 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         run,
         "--planner",
         ParameterChoices(_CONTROLLER, "planner", without=("recorded",)),
-        help="keep the motion by joint torques alone, planned ahead (predictive: without root "
-        "assistance), or not (none, the default)",
+        help="keep the motion by joint torques alone, without root assistance: planned ahead "
+        "(predictive), by the policy that controller_node.policy says (policy), or not (none, the "
+        "default)",
     )
 
 

@@ -26,7 +26,7 @@ from msgs_config.compiled.soft_limits import (
 _knot_before = compiled(knot_before)
 _room_for_bounds = compiled(room_for_bounds)
 
-_MOST_BOUNDS = 32  # of soft limits that are passed at once
+MOST_BOUNDS = 32  # of soft limits that are passed at once
 _MAX_SPEED = 1e3  # rad/s or m/s; what is faster has diverged
 
 
@@ -96,22 +96,22 @@ def roll_out(
     features, knots = borrow(features), borrow(knots)
     n = len(start_velocity)
     room = Room(np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
-    bounds = _room_for_bounds(_MOST_BOUNDS, n)
-    _begin(start_position, start_velocity, engine)
+    bounds = _room_for_bounds(MOST_BOUNDS, n)
+    begin(start_position, start_velocity, engine)
     ticks = len(desired.positions) - 1
     for tick in range(ticks + 1):
         mj.step_before_forces(engine.model, engine.data)
         check, since_check = divmod(tick, desired.check_ticks)
         if check and not since_check:
-            _write_check(features[check - 1], desired.positions[tick], body, engine)
+            write_check(features[check - 1], desired.positions[tick], body, engine)
         if tick < ticks:
             _set_offset(room.error, knots, desired.first_tick + tick, desired)
             target, target_velocity = desired.positions[tick + 1], desired.velocities[tick + 1]
-            _apply(target, target_velocity, body, engine, room, bounds)
-            if not _is_bounded(engine):
+            apply_law(target, target_velocity, body, engine, room, bounds)
+            if not is_bounded(engine):
                 return False  # before MuJoCo writes a warning
-            _step_after_forces(body, engine)
-    return _is_bounded(engine)
+            step_with_forces(body, engine)
+    return is_bounded(engine)
 
 
 @compiled
@@ -126,20 +126,20 @@ def let_act(
 
     The engine's position and velocity are the result.
     """
-    bounds = _room_for_bounds(_MOST_BOUNDS, len(start_velocity))
-    _begin(start_position, start_velocity, engine)
+    bounds = _room_for_bounds(MOST_BOUNDS, len(start_velocity))
+    begin(start_position, start_velocity, engine)
     for tick in range(len(efforts)):
         mj.step_before_forces(engine.model, engine.data)
         engine.applied[:] = efforts[tick]
         _add_passive(body, engine, bounds)
-        if not _is_bounded(engine):
+        if not is_bounded(engine):
             return False  # before MuJoCo writes a warning
-        _step_after_forces(body, engine)
-    return _is_bounded(engine)
+        step_with_forces(body, engine)
+    return is_bounded(engine)
 
 
 @compiled
-def _step_after_forces(body: RolloutModel, engine: EngineBuffers) -> None:
+def step_with_forces(body: RolloutModel, engine: EngineBuffers) -> None:
     """The rest of a tick, with the applied forces."""
     model, data = engine.model, engine.data
     if body.has_own_contacts:
@@ -152,7 +152,7 @@ def _step_after_forces(body: RolloutModel, engine: EngineBuffers) -> None:
 
 
 @compiled
-def _begin(position: FloatArray, velocity: FloatArray, engine: EngineBuffers) -> None:
+def begin(position: FloatArray, velocity: FloatArray, engine: EngineBuffers) -> None:
     """Put it into a state, with nothing left of what it did before."""
     engine.position[:] = position
     engine.velocity[:] = velocity
@@ -160,7 +160,7 @@ def _begin(position: FloatArray, velocity: FloatArray, engine: EngineBuffers) ->
 
 
 @compiled
-def _is_bounded(engine: EngineBuffers) -> bool:
+def is_bounded(engine: EngineBuffers) -> bool:
     """Whether the state is one that goes on, and the forces are finite."""
     bounded = True
     for i in range(len(engine.velocity)):
@@ -180,7 +180,7 @@ def _set_offset(error: FloatArray, knots: FloatArray, tick: int, desired: Desire
 
 
 @compiled
-def _apply(
+def apply_law(
     target: FloatArray,
     target_velocity: FloatArray,
     body: RolloutModel,
@@ -212,9 +212,10 @@ def _add_passive(body: RolloutModel, engine: EngineBuffers, bounds: PassedBounds
 
 
 @compiled
-def _write_check(
+def write_check(
     row: FloatArray, target: FloatArray, body: RolloutModel, engine: EngineBuffers
 ) -> None:
+    """Write the features (f,) of the engine's state against a target position (q,)."""
     write_features(
         row,
         target,
@@ -238,7 +239,20 @@ def features_of(
     engine: EngineBuffers,
 ) -> None:
     """Write the features (f,) of a state against itself: those of a reference."""
+    features_against(row, position, velocity, position, body, engine)
+
+
+@compiled
+def features_against(
+    row: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    target: FloatArray,
+    body: RolloutModel,
+    engine: EngineBuffers,
+) -> None:
+    """Write the features (f,) of a state against a target position (q,)."""
     engine.position[:] = position
     engine.velocity[:] = velocity
     mj.step_before_forces(engine.model, engine.data)
-    _write_check(row, position, body, engine)
+    write_check(row, target, body, engine)

@@ -37,19 +37,31 @@ class ResidualModel:
             (weights.angular_momentum, 3),
             *((weights.feet if foot else weights.hands, 3) for foot in is_foot),
         ]
-        share = 1.0 / math.sqrt(settings.checks)  # the mean of the checks' squares counts
+        # the mean of the checks' squares counts
+        self._share = share = 1.0 / math.sqrt(settings.checks)
         self._weights = share * np.repeat(
             [weight for weight, _ in parts], [count for _, count in parts]
         )
         self._centre = 6 + 2 * joints
-        self._feet, self._hands = (
+        self.feet, self.hands = (
             [self._centre + 9 + 3 * i for i, foot in enumerate(is_foot) if foot is wanted]
             for wanted in (True, False)
         )
+        """Where feet and hands begin among features."""
         self._loose_weights = self._weights.copy()
         self._loose_weights[self._centre : self._centre + 2] *= _LOOSE_CENTRE
-        for foot in self._feet:
+        for foot in self.feet:
             self._loose_weights[foot : foot + 2] = share * _STEP
+
+    @property
+    def weights(self) -> FloatArray:
+        """Weights (f,) of a state's deviations; rollouts count the mean of their checks."""
+        return self._weights / self._share
+
+    @property
+    def loose_weights(self) -> FloatArray:
+        """The same while the reference gives way."""
+        return self._loose_weights / self._share
 
     def balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Centres of mass (..., 3) in m, their velocities (..., 3) in m/s of features (..., f)."""
@@ -64,9 +76,9 @@ class ResidualModel:
         loose = deviations.copy()
         centre = deviations[..., self._centre : self._centre + 3]
         velocity = deviations[..., self._centre + 3 : self._centre + 6]
-        for foot in self._feet:
+        for foot in self.feet:
             loose[..., foot : foot + 2] -= centre[..., :2] + _STEP_TIME * velocity[..., :2]
-        for hand in self._hands:
+        for hand in self.hands:
             loose[..., hand : hand + 3] -= centre
         loose *= self._loose_weights
         return loose

@@ -23,6 +23,8 @@ from msgs_config.bus import keyframe_publisher
 from msgs_config.messages.cdr import decode_header
 from msgs_config.messages.keyframe import Keyframe, decode_keyframe, encode_keyframe
 from msgs_config.messages.topic import Quality
+from tests.support.physics import character
+from tests.support.policies import write_random_policy
 from tests.support.rewriting import rewrite
 from tests.support.runs import summary_of
 
@@ -33,6 +35,8 @@ WALK = ("--clip", "walk")
 PUSH = ("--push", "chest:0,100,0@0.3")
 QUICK = ("--planner", "predictive", "--set", "controller_node.plan.samples:=8")
 MUJOCO = ("--set", "sim_node.engine:=mujoco", "--set", "sim_node.substeps:=2")
+POLICY = "controller_node.policy:="  # and a file, of `make`
+BY_POLICY = (*WALK, *PUSH, "--planner", "policy", "--set", POLICY)
 BALL = ("--throw", "mass=4 speed=8 at=0.5 target=chest")
 
 
@@ -54,6 +58,8 @@ KINDS: dict[str, tuple[str, ...]] = {
     "balance": of_controller("balance.enabled:=true", "root_assistance:=false"),
     "steered": (*of_controller("reference:=steered"), "--cmd-vel", "0.6,0,0.2@0.1"),
     "planned": (*WALK, *PUSH, *QUICK),
+    "policy": BY_POLICY,
+    "policy, other engine": (*BY_POLICY, *MUJOCO, "--set", "sim_node.command_delay_ticks:=2"),
     "planned, late": (
         *WALK,
         *QUICK,
@@ -67,13 +73,15 @@ KINDS: dict[str, tuple[str, ...]] = {
 def make(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Path]]:
     """Makes a run of 0.8 s."""
     folder = tmp_path_factory.mktemp("keyframes")
+    policy = write_random_policy(folder / "policy.npz", character("humanoid"))
     patch = pytest.MonkeyPatch()
     patch.setattr(keyframe_publisher, "_BYTES_PER_SECOND", 1e8)  # else large ones come rarely
 
     def made(name: str, *options: str) -> Path:
         run = folder / name
         if not run.exists():
-            options = (*EVERY, *options, "--duration", "0.8")
+            given = (f"{POLICY}{policy}" if each == POLICY else each for each in options)
+            options = (*EVERY, *given, "--duration", "0.8")
             assert main(["run", "--in-process", *options, "--output", str(run)]) == 0
         return run
 

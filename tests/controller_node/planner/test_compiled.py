@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from numba.core.registry import CPUDispatcher as Dispatcher
 
+from actuated_characters.training import decorator as of_training
 from controller_node.planner.compiled import decorator, rollout
 from msgs_config.compiled import decorator as basics
 from msgs_config.compiled.decorator import Compiler
@@ -23,6 +24,7 @@ def test_the_rollouts_are_kept_where_the_planners_sources_count() -> None:
         ("msgs_config.compiled", basics.compiled),
         ("controller_node.planner.compiled", decorator.compiled),
         ("sim_node.physics.mujoco", compiled_step.compiled),
+        ("actuated_characters.training", of_training.compiled),
     ],
 )
 def test_every_compiled_function_is_of_a_source_that_counts(

@@ -1,0 +1,258 @@
+"""The command `actuated_characters train`: a policy that keeps a motion by joint torques alone."""
+
+import argparse
+import math
+import os
+import shlex
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.settings import (
+    CHARACTER,
+    Commands,
+    add_character,
+    add_command,
+    node_settings,
+)
+from actuated_characters.commands.common.tables import make_facts_table
+from msgs_config.errors import ConfigurationError
+
+if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.training.acceptance import Trial
+    from actuated_characters.training.training import Job, Progress, Training
+
+_FOLDER, _SUFFIX = Path("policies"), ".npz"
+_DECISIONS_A_MINUTE = 500_000  # on two processors
+_WRAPPED_S = 60.0  # length of the last runs of a clip that goes on from its end
+_TRIALS = 5
+
+
+def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command."""
+    command = add_command(
+        commands,
+        _train,
+        "train",
+        "train a policy that keeps a motion by joint torques alone",
+        "Train a small network that answers each state with offsets to a clip's angles, as a "
+        "planner does, by trying in many worlds at once (proximal policy optimisation). Ctrl-C "
+        "ends it and keeps the best so far. Play the result with `run --clip CLIP --planner policy "
+        "--set controller_node.policy:=FILE`.",
+        ["train --clip walk --minutes 10", "train --clip walk --pushes 60 --output walk.npz"],
+    )
+    add_character(command)
+    command.add_argument(
+        "--clip",
+        action="append",
+        metavar="NAME",
+        help="name of a clip, or a file; may be repeated: one policy for all of them (walk)",
+    )
+    command.add_argument(
+        "--minutes",
+        type=float,
+        default=10.0,
+        metavar="M",
+        help=f"how much is tried, in all: {_DECISIONS_A_MINUTE:,} decisions each, which take that "
+        "long on two processors (%(default)g)",
+    )
+    command.add_argument(
+        "--pushes",
+        type=float,
+        default=25.0,
+        metavar="NS",
+        help="impulse, in N s, of the hardest pushes that it learns to take; 0: none (%(default)g)",
+    )
+    command.add_argument("--seed", type=int, default=0, help="of all random numbers (0)")
+    command.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help=f"the policy ({_FOLDER}/CHARACTER-CLIP{_SUFFIX})",
+    )
+    command.add_argument("--overwrite", action="store_true", help="replace FILE")
+    command.add_argument(
+        "--resume", action="store_true", help="go on from the policy in FILE, if there is one"
+    )
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="controller_node.NAME:=VALUE",
+        help="a parameter, such as rate, gains or plan.weight; may be repeated",
+    )
+    command.add_argument(
+        "--threads", type=int, metavar="N", help="of the worlds (one for each processor)"
+    )
+
+
+def _train(options: argparse.Namespace) -> None:
+    clips = tuple(options.clip or ("walk",))
+    output = _output(options, clips)
+    from actuated_characters.training.training import Training, check_start
+    from controller_node.planner.policy.file import read_policy
+
+    job, start = _job(options, clips), None
+    if options.resume and output.exists():
+        start = read_policy(str(output), job.character)
+        check_start(job, start)
+    output.parent.mkdir(exist_ok=True)
+    training = Training(job, start)
+    try:
+        spent = _go_on(training, job, output)
+    finally:
+        training.close()
+    try:
+        trials = _try(options, clips, output)
+    except KeyboardInterrupt:
+        _say(f"interrupted; {output} has no figures of runs of its own")
+        trials = {}
+    _report(training, output, trials, spent)
+    _say_how_to_play(options, clips[0], output)
+
+
+def _go_on(training: "Training", job: "Job", output: Path) -> float:
+    """Train to the end, or to Ctrl-C; the policy is in its file then. Returns wall seconds."""
+    began = time.monotonic()
+    title = f"{job.character.name}: {', '.join(job.names)}"
+    try:
+        with progress_bar(title, job.decisions, "decisions") as bar:
+            while not training.is_over:
+                progress = training.go_on()
+                bar.update(bar.task_ids[0], completed=progress.decisions, state=_words(progress))
+                if progress.is_better:
+                    training.save(output, {})
+    except KeyboardInterrupt:
+        _say(f"interrupted; the best so far is in {output}, and is tried (Ctrl-C leaves that out)")
+    training.save(output, {})
+    return time.monotonic() - began
+
+
+def _say(text: str) -> None:
+    Console(stderr=True).print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+def _words(progress: "Progress") -> str:
+    return (
+        f"lasts {progress.survived_s:.1f} s, pushes {progress.push:.0f} N s, "
+        f"off {progress.off_m:.2f} m {progress.off_rad:.2f} rad"
+    )
+
+
+def _output(options: argparse.Namespace, clips: tuple[str, ...]) -> Path:
+    """The policy's file; raises ConfigurationError where it cannot be written."""
+    name = f"{Path(options.character).stem}-{'-'.join(Path(clip).stem for clip in clips[:3])}"
+    output: Path = options.output or _FOLDER / (name + _SUFFIX)
+    if output.suffix != _SUFFIX:
+        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}")
+    if options.output is not None and not output.absolute().parent.is_dir():
+        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
+    if output.is_dir():
+        raise ConfigurationError(f"--output is {output}; it is a directory")
+    folder = next(each for each in output.absolute().parents if each.exists())
+    if not os.access(folder, os.W_OK):
+        raise ConfigurationError(f"--output is {output}; no permission to write to {folder}")
+    if output.exists() and not (options.resume or options.overwrite):
+        raise ConfigurationError(f"{output} exists; --resume goes on, --overwrite starts over")
+    return output
+
+
+def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
+    """What the options say; raises ActuatedCharactersError if it cannot be trained."""
+    from actuated_characters.runs.plan import make_plan
+    from actuated_characters.training.references import TrainedReference
+    from actuated_characters.training.training import Job
+    from controller_node.parameters import make_controller_settings
+    from controller_node.planner.settings import PREDICTIVE, make_planner_settings
+    from msgs_config.clips.reading import read_clip
+
+    given = _given(options)
+    threads = options.threads if options.threads is not None else len(os.sched_getaffinity(0))
+    for name, value, least in (
+        *(("--minutes", options.minutes, 0.01), ("--pushes", options.pushes, 0.0)),
+        *(("--threads", threads, 1), ("--seed", options.seed, 0)),
+    ):
+        if not least <= value < math.inf:
+            raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
+    given = {**given, "planner": PREDICTIVE, "plan.workers": 1}
+    plans = [
+        make_plan(options.character, 1.0, {"reference": "clip", "clip": clip}, {}, given)
+        for clip in clips
+    ]
+    character, values = plans[0].character, plans[0].controller
+    frames = [read_clip(character, clip) for clip in clips]
+    return Job(
+        character,
+        [
+            TrainedReference(plan.reference, float(each.times[-1]), each.wraps)
+            for plan, each in zip(plans, frames, strict=True)
+        ],
+        clips,
+        make_planner_settings(character, values),
+        make_controller_settings(character, values).gains,
+        round(_DECISIONS_A_MINUTE * options.minutes),
+        options.pushes,
+        options.seed,
+        threads,
+    )
+
+
+def _given(options: argparse.Namespace) -> dict[str, object]:
+    """What `--set` sets; raises ConfigurationError if the command sets it."""
+    given = node_settings(options.set, ("controller_node",))["controller_node"]
+    for name in ("planner", "policy"):
+        if name in given:
+            raise ConfigurationError(
+                f"--set controller_node.{name}:={given[name]}: it is what `train` makes"
+            )
+    return given
+
+
+def _try(
+    options: argparse.Namespace, clips: tuple[str, ...], output: Path
+) -> "dict[str, list[Trial]]":
+    """Runs of the policy, by clip and engine, as `run` makes them, with seeds of their own."""
+    from actuated_characters.training.acceptance import attempt
+    from msgs_config.character.loading import load_character
+    from msgs_config.clips.reading import read_clip
+    from sim_node.physics.engine import INSTALLED_ENGINES
+
+    character, given = options.character, _given(options)
+    frames = {clip: read_clip(load_character(character), clip) for clip in clips}
+    jobs = [(clip, engine) for clip in clips for engine in INSTALLED_ENGINES]
+    trials: dict[str, list[Trial]] = {}
+    with progress_bar("runs of its own", len(jobs) * _TRIALS, "runs", transient=True) as bar:
+        for clip, engine in jobs:
+            seconds = _WRAPPED_S if frames[clip].wraps else float(frames[clip].times[-1])
+            found = trials.setdefault(f"{clip}, {engine}", [])
+            for seed in range(1, _TRIALS + 1):
+                found.append(attempt(character, clip, given, output, seconds, engine, seed))
+                bar.advance(bar.task_ids[0])
+    return trials
+
+
+def _report(
+    training: "Training", output: Path, trials: "dict[str, list[Trial]]", spent: float
+) -> None:
+    """Write the figures into the policy's file, and print them."""
+    from actuated_characters.training.acceptance import figures
+
+    found = figures(trials)
+    training.save(output, found)
+    facts = [("training", f"{spent / 60.0:.1f} minutes, {training.done:,} decisions")]
+    facts += [
+        (name, ", ".join(f"{k} {v}" for k, v in each.items())) for name, each in found.items()
+    ]
+    Console().print(make_facts_table(str(output), facts))
+
+
+def _say_how_to_play(options: argparse.Namespace, clip: str, output: Path) -> None:
+    words = ["actuated_characters", "run", "--clip", clip, "--planner", "policy"]
+    if options.character != CHARACTER:
+        words += ["--character", options.character]
+    for text in (f"controller_node.policy:={output}", *options.set):
+        words += ["--set", text]
+    Console().print("play it:", shlex.join(words), soft_wrap=True, markup=False)

@@ -1,0 +1,1 @@
+"""Training: policies that keep a motion by joint torques alone, found by trying in many worlds."""

@@ -1,0 +1,105 @@
+"""The references that a policy is trained on, tick by tick, and as it is told of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuated_characters.training.episode_types import Table
+from controller_node.planner.compiled.observation import (
+    FRAME_VECTORS,
+    ObservationScales,
+    heading,
+    observe,
+    write_frame,
+)
+from controller_node.planner.compiled.rollout import RolloutModel, features_of
+from controller_node.planner.contact_model import ContactModel
+from controller_node.references.base import Reference
+from msgs_config.arrays import FloatArray, IntArray
+
+_AHEAD_S = (0.0, 0.1, 0.3)  # how far the frames that a policy is told of are ahead
+_AFTER_S = 1.0  # how long an episode goes on after a clip that does not wrap
+_WRAPPED_S = 20.0  # length, at least, of an episode of a clip that wraps
+_DEVIATIONS = (0.2, 0.3, 1.5, 4.0, 0.12, 0.5, 4.0, 0.15)  # scales, in the order of features
+_LEAST_SPREADS = (0.1, 0.3, 0.1, 0.1, 0.05, 0.1)  # of frames' parts that hardly vary
+_WIDE = 4.0  # spreads that count as one: entries of a frame vary together
+
+
+@dataclass(frozen=True)
+class TrainedReference:
+    """A reference, and where its episodes may begin."""
+
+    reference: Reference
+    cycle_s: float  # until which they may begin
+    wraps: bool  # whether it goes on from its end
+
+
+def frames_ahead(rate_hz: int) -> IntArray:
+    """Ticks (k,) from now to the frames that a policy is told of."""
+    return np.array([round(each * rate_hz) for each in _AHEAD_S], dtype=np.intp)
+
+
+def make_table(
+    model: ContactModel, body: RolloutModel, references: Sequence[TrainedReference], rate_hz: int
+) -> tuple[Table, list[IntArray]]:
+    """References as one table, and of each the rows in which episodes may begin."""
+    ahead = frames_ahead(rate_hz)
+    parts, starts, first = list[tuple[FloatArray, ...]](), list[IntArray](), 0
+    for each in references:
+        seconds = each.cycle_s + _AFTER_S
+        if each.wraps:
+            seconds = max(seconds, _WRAPPED_S)
+        count = round(seconds * rate_hz) + int(ahead[-1]) + 2
+        parts.append(_sample(model, body, each.reference, count, rate_hz))
+        begin = max(round(each.cycle_s * rate_hz), 1)
+        starts.append(np.arange(first, first + begin, dtype=np.intp))
+        first += count
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    lasts = np.cumsum([len(part[0]) for part in parts]) - 1
+    ends = np.repeat(lasts, [len(part[0]) for part in parts]).astype(np.intp)
+    positions, velocities, features, frames, facing = columns
+    return Table(positions, velocities, features, frames, facing, ends, ahead), starts
+
+
+def _sample(
+    model: ContactModel, body: RolloutModel, reference: Reference, count: int, rate_hz: int
+) -> tuple[FloatArray, ...]:
+    engine = model.engine()
+    states = [reference.sample(tick / rate_hz) for tick in range(count)]
+    positions = np.array([model.position_of(state.configuration.position) for state in states])
+    velocities = np.array([state.velocity for state in states])
+    centre, n = 2 * velocities.shape[1] - 6, velocities.shape[1]
+    features = np.zeros((count, model.feature_count))
+    ends = model.feature_count - centre - 9
+    frames = np.zeros((count, FRAME_VECTORS + ends + n - 6))
+    for tick, state in enumerate(states):
+        features_of(features[tick], positions[tick], velocities[tick], body, engine)
+        joints = state.configuration.position[6:].copy()
+        write_frame(frames[tick], positions[tick], joints, features[tick], centre)
+    facing = np.array([heading(position, model.left) for position in positions])
+    return positions, velocities, features, frames, facing
+
+
+def make_scales(table: Table, starts: Sequence[IntArray]) -> ObservationScales:
+    """Scales of observations: fixed for deviations, of frames by how they vary."""
+    size, joints = table.features.shape[1], table.velocities.shape[1] - 6
+    centre = 2 * joints + 6
+    ends = size - centre - 9
+    deviation = np.repeat(_DEVIATIONS, (3, joints, 3, joints, 3, 3, 3, ends))
+    shape = (len(table.ahead), table.frames.shape[1])
+    plain = ObservationScales(deviation, np.zeros(shape), np.ones(shape), centre)
+    told = np.array([_told(table, int(row), plain) for row in np.concatenate(starts)])
+    least = np.repeat(_LEAST_SPREADS, (3, 3, 3, 3, ends, joints))
+    spread = _WIDE * np.maximum(told.std(axis=0), least)
+    return ObservationScales(deviation, told.mean(axis=0), spread, centre)
+
+
+def _told(table: Table, row: int, scales: ObservationScales) -> FloatArray:
+    """Frames (k, d) as a policy is told of them at a row."""
+    rows = np.minimum(row + table.ahead, table.ends[row])
+    observation = np.zeros(len(scales.deviation) + scales.frame_mean.size, np.float32)
+    nothing = np.zeros(len(scales.deviation))
+    observe(observation, nothing, table.frames[rows], table.facing[row], scales)
+    found = observation[len(scales.deviation) :].astype(float)
+    return found.reshape(scales.frame_mean.shape)

@@ -1,0 +1,234 @@
+"""The course of a training: episodes, learning, and now and then a look at how good a policy is."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from actuated_characters.training.episode_types import CUT, FELL, Trace
+from actuated_characters.training.learner import Learner, LearningSettings
+from actuated_characters.training.references import (
+    TrainedReference,
+    frames_ahead,
+    make_scales,
+    make_table,
+)
+from actuated_characters.training.worlds import LARGEST_ACTION, TrainingWorlds, hold_ticks
+from controller_node.control_laws import GainArrays
+from controller_node.planner.compiled.network import Network
+from controller_node.planner.policy.file import Policy, write_policy
+from controller_node.planner.settings import PlannerSettings
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+
+_WORLDS, _DECISIONS = 64, 48  # of a trace
+_HIDDEN = 128
+_SPREADS = (0.35, 0.12)  # standard deviation of what is tried, at first and in the end
+_DIVERGENCES = (0.03, 0.008)  # of a policy from the one before, at first and in the end
+_LEAST_PUSH = 5.0  # N s, up to which pushes are at first
+_RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
+_GROWS, _SHRINKS = 0.15, 0.1  # N s a trace
+_LATELY = 0.05  # share of a trace in the mean of falls
+_LOOKS = 20  # at how good a policy is, in a training
+_LOOK_WORLDS, _LOOK_S = 16, 10.0
+_FALL_COSTS = 1.0  # reward, of one fall a second
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be trained."""
+
+    character: Character
+    references: Sequence[TrainedReference]
+    names: tuple[str, ...]  # of the references
+    settings: PlannerSettings
+    gains: GainArrays
+    decisions: int
+    most_push: float  # N s
+    seed: int
+    threads: int
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a training is, and what its worlds, with all that is tried and pushed, are like."""
+
+    decisions: int
+    survived_s: float  # mean length of episodes that ended
+    off_m: float  # median of the centre of mass
+    off_rad: float  # median of a joint
+    push: float  # N s, up to which pushes are
+    is_better: bool  # whether there is a better policy than before
+
+
+def decisions_of(policy: Policy) -> int:
+    """How many decisions a policy was trained with."""
+    return int(policy.about["trained"].get("decisions", 0))
+
+
+def check_start(job: Job, start: Policy) -> None:
+    """Raise ConfigurationError if a job cannot go on from a policy."""
+    rate, hold = job.settings.parameters.rate_hz, start.hold
+    for name, found, wanted in (
+        ("clips", ", ".join(start.about["clips"]), ", ".join(job.names)),
+        ("rate", start.rate_hz, rate),
+        ("hold", hold, hold_ticks(rate)),
+        ("hidden layer", len(start.network.bias_1), _HIDDEN),
+        ("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist()),
+    ):
+        if found != wanted:
+            raise ConfigurationError(
+                f"the policy's {name}: {found}, this training's: {wanted}; "
+                "--resume goes on with the same"
+            )
+    if decisions_of(start) >= job.decisions:
+        raise ConfigurationError(
+            f"the policy was trained with {decisions_of(start):,} decisions, and all --minutes "
+            f"are {job.decisions:,}; --resume goes on with more"
+        )
+
+
+class Training:
+    """Policies of a job, one better than the other. The same job gives the same policies."""
+
+    def __init__(self, job: Job, start: Policy | None = None) -> None:
+        """Build worlds and networks; from a policy's, where there is one."""
+        self._job = job
+        self._done = 0 if start is None else decisions_of(start)
+        rng = np.random.default_rng((job.seed, 0, self._done))  # it goes on with other draws
+        self._worlds, self._judges = (
+            TrainingWorlds(
+                job.character,
+                job.settings,
+                job.gains,
+                threads=job.threads,
+                rng=np.random.default_rng((job.seed, number, self._done)),
+            )
+            for number in (1, 2)
+        )
+        model, body = self._worlds.model, self._worlds.body
+        rate = job.settings.parameters.rate_hz
+        self._table, self._starts = make_table(model, body, job.references, rate)
+        self._scales = make_scales(self._table, self._starts) if start is None else start.scales
+        self._worlds.begin(self._table, self._starts, self._scales, _WORLDS)
+        rules = self._worlds.rules
+        self._decision_s = rules.hold * rules.period
+        inputs = len(self._scales.deviation) + self._scales.frame_mean.size
+        settings = LearningSettings(largest=LARGEST_ACTION)
+        self._learner = Learner((inputs, _HIDDEN, len(rules.unit)), rng, settings)
+        self._push, self._falls = _LEAST_PUSH, _OFTEN
+        self._looked = self._done * _LOOKS // job.decisions
+        self._lengths: list[float] = []
+        self._seconds, self._best = 0.0, -np.inf  # s of processors; score
+        if start is not None:
+            self._learner.take(start.network, start.value)
+            self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
+            self._seconds = float(start.about["trained"].get("processor_s", 0.0))
+            self._look()
+        self._kept = self._current()
+
+    def close(self) -> None:
+        """End its threads."""
+        for each in (self._worlds, self._judges):
+            each.close()
+        self._learner.close()
+
+    @property
+    def done(self) -> int:
+        """How many decisions were made."""
+        return self._done
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all decisions of the job are made."""
+        return self._done >= self._job.decisions
+
+    def go_on(self) -> Progress:
+        """Run episodes for a while, and learn from them."""
+        began = time.process_time()
+        share = min(self._done / self._job.decisions, 1.0)
+        spread, aim = (first * (last / first) ** share for first, last in (_SPREADS, _DIVERGENCES))
+        push = min(self._push, self._job.most_push)
+        trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
+        self._learner.learn(trace, noise, spread, aim)
+        self._done += trace.rewards.size
+        self._lead_pushes(trace)
+        is_due = self._done * _LOOKS >= (self._looked + 1) * self._job.decisions
+        is_better = (is_due or self.is_over) and self._look()
+        self._seconds += time.process_time() - began
+        return self._progress(trace, push, is_better)
+
+    def save(self, path: Path, figures: Mapping[str, object]) -> None:
+        """Write the best policy so far, with the figures that it was accepted with."""
+        write_policy(path, self.best(figures))
+
+    def best(self, figures: Mapping[str, object]) -> Policy:
+        """The best policy so far."""
+        job, rules = self._job, self._worlds.rules
+        network, value, trained = self._kept
+        about = {
+            "character": job.character.name,
+            "dofs": list(job.character.layout.dof_names),
+            "clips": list(job.names),
+            "rate": job.settings.parameters.rate_hz,
+            "hold": rules.hold,
+            "largest": rules.largest,
+            "trained": trained,
+            "figures": figures,
+        }
+        ahead = self._table.ahead
+        return Policy(about, network, value, self._scales, ahead, rules.unit)
+
+    def _lead_pushes(self, trace: Trace) -> None:
+        falls = float((trace.ends == FELL).mean()) / self._decision_s
+        self._falls += _LATELY * (falls - self._falls)
+        by = _GROWS if self._falls < _RARE else -_SHRINKS if self._falls > _OFTEN else 0.0
+        self._push = float(np.clip(self._push + by, _LEAST_PUSH, max(self._job.most_push, 0.0)))
+
+    def _look(self) -> bool:
+        """Keep the policy if it is the best so far, in episodes as it would be used; if it is."""
+        self._looked = self._done * _LOOKS // self._job.decisions
+        self._judges.begin(self._table, self._starts, self._scales, _LOOK_WORLDS)
+        decisions = round(_LOOK_S / self._decision_s)
+        trace, _ = self._judges.run(self._learner.policy, decisions, 0.0, 0.0)
+        falls = float((trace.ends == FELL).mean()) / self._decision_s
+        score = float(trace.rewards.mean()) - _FALL_COSTS * falls
+        is_better = score >= self._best
+        if is_better:
+            self._best, self._kept = score, self._current()
+        return is_better
+
+    def _current(self) -> tuple[Network, Network, Mapping[str, object]]:
+        """Copies of policy and value, and what they were trained with."""
+        learner, job = self._learner, self._job
+        trained = {
+            "decisions": self._done,
+            "seed": job.seed,
+            "pushes_ns": round(min(self._push, job.most_push), 1),
+            "processor_s": round(self._seconds, 1),
+        }
+        policy, value = (
+            Network(*(each.copy() for each in network))
+            for network in (learner.policy, learner.value)
+        )
+        return policy, value, trained
+
+    def _progress(self, trace: Trace, push: float, is_better: bool) -> Progress:
+        ended = trace.lengths[(trace.ends == FELL) | (trace.ends == CUT)]
+        self._lengths = (self._lengths + ended.tolist())[-4 * _WORLDS :]
+        lasted = float(np.mean(self._lengths)) if self._lengths else 0.0
+        centre, joints = self._scales.centre, self._table.velocities.shape[1] - 6
+        off = trace.observations[..., : len(self._scales.deviation)] * self._scales.deviation
+        places: FloatArray = np.linalg.norm(off[..., centre : centre + 3], axis=-1)
+        turns = np.abs(off[..., 3 : 3 + joints])
+        return Progress(
+            self._done,
+            lasted * self._decision_s,
+            float(np.median(places)),
+            float(np.median(turns.mean(axis=-1))),
+            push,
+            is_better,
+        )

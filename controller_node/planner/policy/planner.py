@@ -1,0 +1,213 @@
+"""A trained policy in a planner's place: an answer of a network instead of a search.
+
+A decision holds for some ticks. The policy sees how the state deviates from the reference, which
+gives way to pushes as a planner's does, and where the reference leads; its answer is what a planner
+finds: offsets to the tracking errors. (Peng et al. 2018, "DeepMimic".)
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from controller_node.control_laws import GainArrays
+from controller_node.planner.anchor import Anchor, planar_state
+from controller_node.planner.base import DesiredAt
+from controller_node.planner.compiled.observation import (
+    decide,
+    find_deviation,
+    heading,
+    observe,
+    write_frame,
+)
+from controller_node.planner.compiled.rollout import RolloutModel, features_against
+from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.outlook import Outlook
+from controller_node.planner.policy.file import Policy
+from controller_node.planner.settings import PlannerParameters
+from controller_node.references.base import ReferenceState
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Character
+from msgs_config.messages.state import StampedState
+
+if TYPE_CHECKING:
+    from controller_node.planner.commands_in_flight import CommandsInFlight
+
+
+@dataclass(frozen=True)
+class Told:
+    """The reference at one tick, as a policy is told of it."""
+
+    position: FloatArray  # (q,) MuJoCo's
+    velocity: FloatArray  # (n,)
+    features: FloatArray  # (f,)
+    frame: FloatArray  # (d,)
+    facing: float  # rad
+
+
+class PolicyPlanner:
+    """Answers each decision in constant time. It remembers the last one, and the anchor."""
+
+    def __init__(
+        self,
+        character: Character,
+        policy: Policy,
+        given: PlannerParameters,
+        in_flight: "CommandsInFlight | None" = None,
+    ) -> None:
+        """Build the model of the dynamics."""
+        self._made_of = (character, policy, given)
+        self.in_flight = in_flight
+        self._policy, self._given = policy, given
+        self._model = ContactModel.of(character, given)
+        self._engine = self._model.engine()
+        self._centre = policy.scales.centre
+        self._gains: GainArrays | None = None
+        self._told: dict[int, Told] = {}
+        self._compile(character)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """For a copy, in this process or another: it goes on alike."""
+        sent = None if self.in_flight is None else self.in_flight.sent()
+        state = (self._offset, self._decided, self._anchor, self.outlook, sent)
+        return _copy_of, (self._made_of, state)
+
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """What is large in it and does not change."""
+        return (self._policy,)
+
+    def while_waiting(self, act: Callable[[], None]) -> None:
+        """It does not wait."""
+
+    def begin_episode(self, episode: int) -> None:
+        """Forget all."""
+        del episode
+        self._told.clear()
+        self.rest()
+        if self.in_flight is not None:
+            self.in_flight.clear()
+
+    def change_reference(self, since: int = 0) -> None:
+        """Forget the reference from a tick on; the decision in force stays."""
+        for tick in [tick for tick in self._told if tick >= since]:
+            del self._told[tick]
+
+    def rest(self) -> None:
+        """Forget the decision, and where the reference had given way to: nothing is tracked."""
+        self._offset: FloatArray | None = None
+        self._decided = 0
+        self._anchor = Anchor()
+        self.outlook: Outlook | None = None
+
+    def offset(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> FloatArray:
+        """What is added to the tracking errors (n,) of a state at a tick; zero for the root."""
+        hold = self._policy.hold
+        if self._offset is not None and tick < self._decided:
+            self.rest()  # a state of before, which comes once more
+        if self._offset is None or tick // hold > self._decided // hold:
+            self._offset = self._decide(tick, state, gains, desired_at)
+            self._decided = tick
+        return self._offset
+
+    def _compile(self, character: Character) -> None:
+        """Have all compiled before the first state waits for an answer: one decision at rest."""
+        layout = character.layout
+        rest, nothing = np.array(character.rest_position), np.zeros(layout.size)
+        still = ReferenceState(layout.configuration(rest), nothing, nothing)
+        gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
+        self.rest()
+        self._decide(0, StampedState(0, rest, nothing, None), gains, lambda _: still)
+        self.begin_episode(0)
+
+    def _decide(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> FloatArray:
+        if gains is not self._gains:
+            self._gains, self._body = gains, self._model.body(gains)
+        policy, body = self._policy, self._body
+        frames = [self._tell(tick + ahead, desired_at, body) for ahead in policy.ahead.tolist()]
+        for known in [known for known in self._told if known < tick]:
+            del self._told[known]
+        now, position = frames[0], self._model.position_of(state.position)
+        velocity = state.velocity.copy()  # a message's cannot be written to, another type to numba
+        features = self._look(tick, position, velocity, now, body)
+        deviation = np.empty(len(features))
+        find_deviation(deviation, features, now.features, now.facing, self._centre)
+        told = np.array([each.frame for each in frames])
+        observation = np.empty(len(features) + told.size, np.float32)
+        observe(observation, deviation, told, now.facing, policy.scales)
+        offset = np.zeros(len(velocity))
+        expected = decide(
+            offset[6:], policy.network, policy.value, observation, policy.unit, policy.largest
+        )
+        self.outlook = self._expect(expected, features)
+        return offset
+
+    def _look(
+        self, tick: int, position: FloatArray, velocity: FloatArray, now: Told, body: RolloutModel
+    ) -> FloatArray:
+        """The features (f,) of a state in the reference's world, which may give way to it."""
+        seen = self._anchor.to_reference_world(position, velocity)
+        features = self._features(*seen, now.position, body)
+        if not self._given.gives_way:
+            return features
+        rate = self._given.rate_hz
+        elapsed = 0.0 if self._offset is None else (tick - self._decided) / rate
+        before = self._anchor
+        self._anchor = before.advanced(
+            planar_state(*seen, *self._balance(features)),
+            planar_state(now.position, now.velocity, *self._balance(now.features)),
+            tick / rate,
+            elapsed,
+        )
+        if (self._anchor.place, self._anchor.yaw) == (before.place, before.yaw):
+            return features
+        return self._features(
+            *self._anchor.to_reference_world(position, velocity), now.position, body
+        )
+
+    def _balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Centre of mass (3,) in m and its velocity (3,) in m/s."""
+        first = self._centre
+        return features[first : first + 3], features[first + 3 : first + 6]
+
+    def _features(
+        self, position: FloatArray, velocity: FloatArray, target: FloatArray, body: RolloutModel
+    ) -> FloatArray:
+        features = np.zeros(self._model.feature_count)
+        features_against(features, position, velocity, target, body, self._engine)
+        return features
+
+    def _tell(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> Told:
+        if tick not in self._told:
+            state = desired_at(tick)
+            position = self._model.position_of(state.configuration.position)
+            features = self._features(position, state.velocity, position, body)
+            frame = np.empty(self._policy.scales.frame_mean.shape[1])
+            joints = state.configuration.position[6:].copy()
+            write_frame(frame, position, joints, features, self._centre)
+            facing = heading(position, self._model.left)
+            self._told[tick] = Told(position, state.velocity, features, frame, facing)
+        return self._told[tick]
+
+    def _expect(self, expected: float, features: FloatArray) -> Outlook:
+        """What it expects: a cost of 0 to 1 instead of a plan's."""
+        cost = np.array([1.0 - expected])
+        centre = self._anchor.to_world(self._balance(features)[0][np.newaxis])
+        return Outlook(np.zeros(1), centre, cost, cost, self._anchor)
+
+
+def _copy_of(made_of: tuple[Character, Policy, PlannerParameters], state: Any) -> object:
+    """The copy of a planner that was made of these, in its state."""
+    from controller_node.planner.factory import make_commands_in_flight
+
+    character, _, given = made_of
+    copy = PolicyPlanner(*made_of, make_commands_in_flight(character, given))
+    copy._offset, copy._decided, copy._anchor, copy.outlook, sent = state
+    if copy.in_flight is not None:
+        copy.in_flight.restore(sent)
+    return copy

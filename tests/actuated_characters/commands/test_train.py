@@ -1,0 +1,194 @@
+"""The command `train`: from options to a file that `run` plays."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuated_characters.cli import main
+from actuated_characters.commands import train
+from actuated_characters.commands.common.interruption import Interrupted
+from actuated_characters.training import acceptance
+from actuated_characters.training.acceptance import Trial
+from actuated_characters.training.training import Progress, Training
+from controller_node.planner.policy.file import read_policy
+from tests.support.physics import DATA
+from tests.support.policies import write_random_policy
+from tests.support.training import HUMANOID, make_small
+
+FEW = ["--minutes", "0.01"]  # 2 decisions a minute, see `small`
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Minutes of few decisions, tried for a moment, where files may be left."""
+    monkeypatch.chdir(tmp_path)
+    make_small(monkeypatch)
+    monkeypatch.setattr(train, "_DECISIONS_A_MINUTE", 6_400)
+    monkeypatch.setattr(train, "_WRAPPED_S", 0.4)
+    monkeypatch.setattr(train, "_TRIALS", 2)
+
+
+@pytest.mark.slow
+def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    given = ["--set", "controller_node.rate:=120", "--seed", "3"]
+
+    assert main(["train", *FEW, *given]) == 0
+
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.splitlines() if line.startswith("play it:")]
+    assert "controller_node.rate:=120" in line
+    policy = read_policy("policies/humanoid-walk.npz", HUMANOID)
+    assert policy.rate_hz == 120
+    assert "64 decisions" in said
+    assert {figures["to the end"] for figures in policy.about["figures"].values()} == {"2 of 2"}
+    assert "walk, mujoco" in policy.about["figures"]
+    assert "walk, mujoco" in said
+    words = line.removeprefix("play it: actuated_characters ").split()
+    assert main([*words, "--in-process", "--duration", "0.3", "--output", "run"]) == 0
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert not summary["fell"]
+
+
+def test_it_says_how_to_play_another_character(capsys: pytest.CaptureFixture[str]) -> None:
+    parser_given = ["--character", "my robot.urdf", "--set", "controller_node.rate:=120"]
+    options = _options(["train", *parser_given])
+
+    train._say_how_to_play(options, "my clip.csv", Path("a b.npz"))
+
+    assert capsys.readouterr().out.split("play it: ")[1].strip() == (
+        "actuated_characters run --clip 'my clip.csv' --planner policy --character "
+        "'my robot.urdf' --set 'controller_node.policy:=a b.npz' --set controller_node.rate:=120"
+    )
+
+
+def _options(arguments: Sequence[str]) -> object:
+    from actuated_characters.cli import _parser
+
+    return _parser().parse_args(arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--minutes", "0"], "--minutes is 0; it must be 0.01 or more"),
+        (["--minutes", "nan"], "--minutes is nan; it must be 0.01 or more"),
+        (["--minutes", "inf"], "--minutes is inf"),
+        (["--pushes", "-1"], "--pushes is -1; it must be 0 or more"),
+        (["--pushes", "inf"], "--pushes is inf"),
+        (["--seed", "-1"], "--seed is -1; it must be 0 or more"),
+        (["--threads", "0"], "--threads is 0; it must be 1 or more"),
+        (["--clip", "wlak"], "wlak"),
+        (["--character", "humanoit"], "humanoit"),
+        (["--character", "pendulum"], "pendulum"),
+        (["--character", str(DATA / "free_box.yaml")], "free_box"),
+        (["--output", "walk.zip"], "--output is walk.zip; it must end in .npz"),
+        (["--output", "nowhere/walk.npz"], "there is no directory nowhere"),
+        (["--output", "folder.npz"], "--output is folder.npz; it is a directory"),
+        (["--output", "there.npz"], "there.npz exists; --resume goes on, --overwrite starts over"),
+        (["--output", "there.npz", "--resume", "--clip", "run"], "clips: walk"),
+        (["--output", "broken.npz", "--resume"], "broken.npz"),
+        (["--set", "controller_node.planner:=none"], "controller_node.planner:=none"),
+        (["--set", "controller_node.policy:=x.npz"], "controller_node.policy:=x.npz"),
+        (["--set", "controller_node.reference:=hold"], "reference"),
+        (["--set", "controller_node.wieght:=1"], "wieght"),
+        (["--set", "sim_node.rate:=120"], "sim_node"),
+    ],
+)
+def test_a_mistake_is_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, options: list[str], says: str
+) -> None:
+    (tmp_path / "folder.npz").mkdir()
+    write_random_policy(tmp_path / "there.npz", HUMANOID)
+    (tmp_path / "broken.npz").write_text("no archive")
+    before = (tmp_path / "there.npz").read_bytes()
+
+    assert main(["train", *FEW, *options]) == 1
+
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    assert says in line
+    assert (tmp_path / "there.npz").read_bytes() == before
+    assert not (tmp_path / "policies").exists()
+
+
+def no_trials(*ignored: object) -> Trial:
+    return Trial(0.4, True, 0.01, 0.02)
+
+
+def test_it_overwrites_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    make_small(monkeypatch, _LOOKS=1)
+    monkeypatch.setattr(acceptance, "attempt", no_trials)
+    write_random_policy(tmp_path / "walk.npz", HUMANOID)
+    given = ["train", "--output", "walk.npz", "--threads", "1"]
+
+    assert main([*given, "--minutes", "0.01", "--overwrite"]) == 0
+    assert read_policy("walk.npz", HUMANOID).about["trained"]["decisions"] == 64
+    assert main([*given, "--minutes", "0.01", "--resume"]) == 1
+    assert "64 decisions" in capsys.readouterr().err
+    assert main([*given, "--minutes", "0.02", "--resume"]) == 0
+    assert "128 decisions" in capsys.readouterr().out
+
+
+def interrupted_at(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
+    """Have Ctrl-C come in the midst of a trace."""
+    go_on, calls = Training.go_on, []
+
+    def interrupted(self: Training) -> Progress:
+        calls.append(None)
+        progress = go_on(self)
+        if len(calls) == count:
+            self._learner.policy.bias_3[:] = np.nan  # whatever is half done
+            raise Interrupted
+        return progress
+
+    monkeypatch.setattr(Training, "go_on", interrupted)
+
+
+def test_an_interruption_keeps_the_best(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    interrupted_at(monkeypatch, 3)
+    monkeypatch.setattr(acceptance, "attempt", no_trials)
+
+    assert main(["train", "--minutes", "10", "--output", "walk.npz"]) == 0
+
+    policy = read_policy("walk.npz", HUMANOID)
+    assert np.isfinite(policy.network.bias_3).all()
+    assert policy.about["figures"]["walk, mujoco"]["to the end"] == "2 of 2"
+    said = capsys.readouterr()
+    assert "interrupted; the best so far is in walk.npz" in said.err
+    assert "play it:" in said.out
+
+
+def test_a_second_interruption_leaves_out_the_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    interrupted_at(monkeypatch, 1)
+
+    def interrupted(*ignored: object) -> Trial:
+        raise Interrupted
+
+    monkeypatch.setattr(acceptance, "attempt", interrupted)
+
+    assert main(["train", "--minutes", "10", "--output", "walk.npz"]) == 0
+
+    assert read_policy("walk.npz", HUMANOID).about["figures"] == {}
+    said = capsys.readouterr()
+    assert "play it:" in said.out
+    assert "Traceback" not in said.err
+    assert [path.name for path in tmp_path.iterdir()] == ["walk.npz"]
+
+
+def test_the_help_says_what_is_trained(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["train", "--help"])
+
+    said = " ".join(capsys.readouterr().out.split())
+    for each in ("--clip NAME", "--minutes M", "500,000 decisions", "policies/CHARACTER-CLIP.npz"):
+        assert each in said.replace("6,400", "500,000")
+    assert "--planner policy" in said

@@ -1,0 +1,228 @@
+"""The course of a training: reproducible, resumable, ever harder pushes, and the best is kept."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from actuated_characters.training import training as module
+from actuated_characters.training.episode_types import FELL
+from actuated_characters.training.training import Job, Training, check_start
+from controller_node.planner.policy.file import Policy, read_policy
+from msgs_config.errors import ConfigurationError
+from tests.support.training import DECISIONS, HUMANOID, arrays_of, make_small, walking_job
+
+JOB = walking_job()
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    make_small(monkeypatch)
+
+
+@pytest.fixture
+def begin() -> Iterator[Callable[..., Training]]:
+    begun: list[Training] = []
+
+    def make(job: Job = JOB, start: Policy | None = None) -> Training:
+        begun.append(Training(job, start))
+        return begun[-1]
+
+    yield make
+    for each in begun:
+        each.close()
+
+
+def train(training: Training) -> Policy:
+    """Train to the end; the best policy, without the time that it took."""
+    while not training.is_over:
+        training.go_on()
+    return training.best({})
+
+
+def content(policy: Policy) -> tuple[object, ...]:
+    """All of a policy but the time that its training took."""
+    about = {**policy.about, "trained": {**policy.about["trained"], "processor_s": None}}
+    arrays = [*policy.network, *policy.value, *policy.scales[:3], policy.ahead, policy.unit]
+    return about, [each.tobytes() for each in arrays]
+
+
+@pytest.mark.slow
+def test_the_number_of_threads_does_not_matter_and_the_seed_does(
+    begin: Callable[..., Training],
+) -> None:
+    one, two, three = (train(begin(replace(JOB, threads=count))) for count in (1, 2, 3))
+    other = train(begin(replace(JOB, seed=2)))
+
+    assert content(one) == content(two) == content(three)
+    assert content(one)[1] != content(other)[1]
+
+
+def test_a_policy_comes_back_from_its_file(begin: Callable[..., Training], tmp_path: Path) -> None:
+    training = begin(replace(JOB, decisions=DECISIONS))
+    training.go_on()
+    training.save(tmp_path / "walk.npz", {"walk": {"to the end": "5 of 5"}})
+
+    policy = read_policy(str(tmp_path / "walk.npz"), HUMANOID)
+
+    assert content(policy)[1] == content(training.best({}))[1]
+    assert policy.about["figures"] == {"walk": {"to the end": "5 of 5"}}
+    assert policy.about["clips"] == ["walk"]
+    assert policy.about["trained"]["decisions"] == DECISIONS
+
+
+def test_a_training_that_is_resumed_goes_on_from_the_policy(
+    begin: Callable[..., Training],
+) -> None:
+    first = begin(replace(JOB, decisions=DECISIONS))
+    policy = train(first)
+    about = {**policy.about, "trained": {**policy.about["trained"], "pushes_ns": 12.0}}
+    policy = replace(policy, about=about)
+
+    resumed, afresh = begin(start=policy), begin()
+    strengths = [[each.strength for each in one._worlds._episodes] for one in (resumed, afresh)]
+    kept = resumed.best({})
+    progress = resumed.go_on()
+
+    for name, array in arrays_of(policy).items():
+        assert array.tobytes() == arrays_of(kept)[name].tobytes()
+    assert progress.decisions == 2 * DECISIONS
+    assert progress.push == 12.0
+    assert any(
+        (array != trained).any()
+        for array, trained in zip(policy.network, resumed._learner.policy, strict=True)
+    )
+    assert strengths[0] != strengths[1], "the draws are those that it began with"
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"clips": ["run"]}, "clips: run, this training's: walk"),
+        ({"rate": 120}, "rate: 120, this training's: 240"),
+        ({"hold": 4}, "hold: 4, this training's: 8"),
+        ({"trained": {"decisions": 10**9}}, "1,000,000,000 decisions"),
+    ],
+)
+def test_it_goes_on_with_the_same_and_with_more(
+    begin: Callable[..., Training], change: dict[str, object], says: str
+) -> None:
+    policy = begin().best({})
+    check_start(JOB, policy)
+
+    with pytest.raises(ConfigurationError, match=says):
+        check_start(JOB, replace(policy, about={**policy.about, **change}))
+
+
+def test_networks_of_another_size_are_refused(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    policy = begin().best({})
+    monkeypatch.setattr(module, "_HIDDEN", 32)
+
+    with pytest.raises(ConfigurationError, match="hidden layer: 128, this training's: 32"):
+        check_start(JOB, policy)
+
+
+@pytest.mark.parametrize(
+    ("most", "falls", "begins", "ends"),
+    [
+        (30.0, 0.0, 10.0, "more"),
+        (30.0, 0.01, 10.0, "the same"),
+        (30.0, 0.1, 10.0, "less"),
+        (12.0, 0.0, 10.0, 12.0),
+        (30.0, 0.1, 5.2, 5.0),
+        (3.0, 0.0, 5.0, 3.0),
+        (0.0, 0.0, 5.0, 0.0),
+    ],
+)
+def test_pushes_grow_while_falls_are_rare(
+    begin: Callable[..., Training], most: float, falls: float, begins: float, ends: float | str
+) -> None:
+    """`falls` is the share of decisions that end in one, 30 a second."""
+    training = begin(replace(JOB, most_push=most))
+    training._push = begins
+    ended = np.zeros(1000, np.intp)
+    ended[: round(1000 * falls)] = FELL
+
+    for _ in range(30):
+        training._falls = 30.0 * falls  # as it is after many such traces
+        training._lead_pushes(SimpleNamespace(ends=ended))  # type: ignore[arg-type]
+
+    if isinstance(ends, float):
+        assert training._push == pytest.approx(ends)
+    else:
+        signs = {"more": 1, "the same": 0, "less": -1}
+        assert np.sign(training._push - begins) == signs[ends]
+
+
+def test_the_best_is_kept_rather_than_the_last(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = begin()
+    scores = iter((0.2, 0.7, 0.5))
+    bests = []
+
+    def run(*ignored: object) -> tuple[object, None]:
+        ends = np.zeros((2, 6), np.intp)
+        return SimpleNamespace(ends=ends, rewards=np.full((2, 6), next(scores))), None
+
+    monkeypatch.setattr(training._judges, "run", run)
+    for number in range(3):
+        training._learner.policy.bias_3[:] = number
+        bests.append(training._look())
+
+    assert bests == [True, True, False]
+    assert (training.best({}).network.bias_3 == 1.0).all()
+
+
+def test_a_file_says_what_its_own_policy_was_trained_with(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not what was tried after it, which led to nothing better."""
+    training = begin(replace(JOB, decisions=10 * DECISIONS))
+    training.go_on()
+    training._look()
+    kept = training.best({})
+    monkeypatch.setattr(training, "_look", lambda: False)
+
+    training.go_on()
+
+    assert training.done == 2 * DECISIONS
+    assert training.best({}).about == kept.about
+    assert kept.about["trained"]["decisions"] == DECISIONS
+
+
+def test_a_policy_that_falls_is_worse_than_one_that_costs_a_little_more(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = begin()
+    seen = iter(((0.5, 0), (0.6, 1)))
+
+    def run(*ignored: object) -> tuple[object, None]:
+        reward, falls = next(seen)
+        ends = np.zeros((2, 30), np.intp)
+        ends[:falls, 3] = FELL  # half a fall a second
+        return SimpleNamespace(ends=ends, rewards=np.full((2, 30), reward)), None
+
+    monkeypatch.setattr(training._judges, "run", run)
+
+    assert [training._look(), training._look()] == [True, False]
+
+
+def test_it_looks_as_often_as_it_should(begin: Callable[..., Training]) -> None:
+    job = replace(JOB, decisions=10 * DECISIONS)
+    training, looks = begin(job), []
+    look = training._look
+
+    def count() -> bool:
+        looks.append(training.done // DECISIONS)
+        return look()
+
+    training._look = count  # type: ignore[method-assign]
+    train(training)
+
+    assert looks == [5, 10]

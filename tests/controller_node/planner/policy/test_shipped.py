@@ -1,0 +1,29 @@
+"""The policies that come with the package keep their clips, in worlds that training did not see."""
+
+import pytest
+
+from actuated_characters.training.acceptance import attempt
+from controller_node.planner.policy.file import SHIPPED, SUFFIX, read_policy, shipped_policies
+from sim_node.physics.engine import INSTALLED_ENGINES
+from tests.support.physics import character
+
+MOST_BYTES = 300_000
+
+
+@pytest.mark.parametrize("name", shipped_policies())
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
+def test_it_keeps_its_clip_by_joint_torques_alone(name: str, engine: str) -> None:
+    file = SHIPPED / (name + SUFFIX)
+    (clip,) = read_policy(name, character("humanoid")).about["clips"]
+
+    trials = [attempt("humanoid", clip, {}, file, 10.0, engine, seed) for seed in (11, 12)]
+
+    assert all(each.to_the_end for each in trials)
+    assert max(each.centre_error_m for each in trials) < 0.12
+    assert max(each.joint_error_rad for each in trials) < 0.3
+
+
+def test_there_is_one_and_each_is_small() -> None:
+    files = [SHIPPED / (name + SUFFIX) for name in shipped_policies()]
+    assert "walk" in shipped_policies()
+    assert max(file.stat().st_size for file in files) < MOST_BYTES
