@@ -126,6 +126,8 @@ def _go_on(training: "Training", job: "Job", output: Path) -> float:
                 if progress.is_better:
                     training.save(output, {})
     except KeyboardInterrupt:
+        if not training.has_best:
+            raise  # so soon there is nothing better than what FILE may have
         _say(f"interrupted; the best so far is in {output}, and is tried (Ctrl-C leaves that out)")
     training.save(output, {})
     return time.monotonic() - began
@@ -165,6 +167,7 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     from actuated_characters.runs.plan import make_plan
     from actuated_characters.training.references import TrainedReference
     from actuated_characters.training.training import Job
+    from controller_node.controller_settings import check_planned
     from controller_node.parameters import make_controller_settings
     from controller_node.planner.settings import PREDICTIVE, make_planner_settings
     from msgs_config.clips.reading import read_clip
@@ -183,6 +186,8 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
         for clip in clips
     ]
     character, values = plans[0].character, plans[0].controller
+    settings = make_controller_settings(character, values)
+    check_planned(settings)
     frames = [read_clip(character, clip) for clip in clips]
     return Job(
         character,
@@ -192,7 +197,7 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
         ],
         clips,
         make_planner_settings(character, values),
-        make_controller_settings(character, values).gains,
+        settings.gains,
         round(_DECISIONS_A_MINUTE * options.minutes),
         options.pushes,
         options.seed,

@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -62,6 +63,10 @@ class Progress:
     off_rad: float  # median of a joint
     push: float  # N s, up to which pushes are
     is_better: bool  # whether there is a better policy than before
+
+
+Kept: TypeAlias = tuple[Network, Network, Mapping[str, object]]
+"""Policy, value, and what they were trained with."""
 
 
 def decisions_of(policy: Policy) -> int:
@@ -123,12 +128,12 @@ class Training:
         self._looked = self._done * _LOOKS // job.decisions
         self._lengths: list[float] = []
         self._seconds, self._best = 0.0, -np.inf  # s of processors; score
+        self._kept: Kept | None = None  # the best so far
         if start is not None:
             self._learner.take(start.network, start.value)
             self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
             self._seconds = float(start.about["trained"].get("processor_s", 0.0))
             self._look()
-        self._kept = self._current()
 
     def close(self) -> None:
         """End its threads."""
@@ -140,6 +145,11 @@ class Training:
     def done(self) -> int:
         """How many decisions were made."""
         return self._done
+
+    @property
+    def has_best(self) -> bool:
+        """Whether a policy was found good enough to be kept: at the first look."""
+        return self._kept is not None
 
     @property
     def is_over(self) -> bool:
@@ -166,7 +176,8 @@ class Training:
         write_policy(path, self.best(figures))
 
     def best(self, figures: Mapping[str, object]) -> Policy:
-        """The best policy so far."""
+        """The best policy so far; there is one from the first look on."""
+        assert self._kept is not None
         job, rules = self._job, self._worlds.rules
         network, value, trained = self._kept
         about = {
@@ -201,7 +212,7 @@ class Training:
             self._best, self._kept = score, self._current()
         return is_better
 
-    def _current(self) -> tuple[Network, Network, Mapping[str, object]]:
+    def _current(self) -> Kept:
         """Copies of policy and value, and what they were trained with."""
         learner, job = self._learner, self._job
         trained = {

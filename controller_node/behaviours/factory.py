@@ -3,7 +3,7 @@
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.state_machine import factory as state_machine
-from controller_node.planner.settings import NO_PLANNER, RECORDED, PlannerParameters
+from controller_node.planner.settings import NO_PLANNER, POLICY, RECORDED, PlannerParameters
 from controller_node.references import factory
 from controller_node.references.base import Motion
 from msgs_config.character.model import Character
@@ -51,7 +51,7 @@ def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
 
 
 def _check_planner(behaviour: str, planner: str) -> None:
-    if planner == RECORDED and behaviour != "tracking":
+    if planner in (RECORDED, POLICY) and behaviour != "tracking":
         wanted = "the behaviour tracking"
     elif planner != NO_PLANNER and behaviour == "ragdoll":
         wanted = "a behaviour that follows a motion"

@@ -1,5 +1,6 @@
 """The planner that a controller's parameters say."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller_node.planner.base import Planner
@@ -72,14 +73,19 @@ def _read_policy(character: Character, values: Values) -> "Policy":
     """
     from controller_node.planner.policy.file import read_policy, shipped_policies
 
-    given, name = PlannerParameters.of(values), PlannerParameters.of(values).policy
-    if not name and MotionSettings.of(values).reference == "clip":
-        clip = ClipSettings.of(values).clip
-        name = clip if clip in shipped_policies() else name
+    given, reference = PlannerParameters.of(values), MotionSettings.of(values).reference
+    clip = ClipSettings.of(values).clip if reference == "clip" else ""
+    name = given.policy or (clip if clip in shipped_policies() else "")
     policy = read_policy(name, character)
     if policy.rate_hz != given.rate_hz:
         raise ConfigurationError(
             f"parameter 'rate' is {given.rate_hz}; the policy '{name}' is for {policy.rate_hz}"
+        )
+    clips = policy.about["clips"]
+    if Path(clip).stem not in [Path(each).stem for each in clips]:
+        tracked = f"the clip is {clip}" if clip else f"'reference' is {reference}"
+        raise ConfigurationError(
+            f"the policy '{name}' was trained on {', '.join(clips)}; {tracked}"
         )
     return policy
 

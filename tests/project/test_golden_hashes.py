@@ -14,7 +14,10 @@ NIGHTLY = {  # the others hold the same code
     *("planned_walk", "planned_reactive_hit_short", "planned_backflip_short", "run_machine"),
     *("kick", "spin", "spinkick", "dance_a", "dance_b", "roll", "crawl", "punch", "getup_faceup"),
 }
-OVER_TOPICS = ["panda_sine", "reactive_hit", "walk_480_delay", "walk_reconstructed"]  # of each kind
+OVER_TOPICS = [
+    *("panda_sine", "policy"),
+    *("reactive_hit", "walk_480_delay", "walk_reconstructed"),
+]  # of each kind; those of the first line each time
 
 
 def marks_of(name: str) -> list[pytest.MarkDecorator]:
@@ -50,7 +53,10 @@ def test_a_golden_run_has_the_states_of_the_table(name: str, engine: str, tmp_pa
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    [OVER_TOPICS[0], *(pytest.param(name, marks=pytest.mark.nightly) for name in OVER_TOPICS[1:])],
+    [
+        *OVER_TOPICS[:2],
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in OVER_TOPICS[2:]),
+    ],
 )
 @pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 def test_over_topics_it_has_them_too(name: str, engine: str, domain: int, tmp_path: Path) -> None:

@@ -161,6 +161,10 @@ def _read_about(content: Mapping[str, Any]) -> Mapping[str, Any]:
             raise ValueError(f"'{name}' in 'about' must be {words}")
     if not all(isinstance(name, str) for name in (*about["dofs"], *about["clips"])):
         raise ValueError("'dofs' and 'clips' in 'about' must be lists of names")
+    for name in ("decisions", "pushes_ns", "processor_s"):
+        number = about["trained"].get(name, 0)
+        if not isinstance(number, int | float) or not 0 <= number < math.inf:
+            raise ValueError(f"'{name}' of 'trained' in 'about' must be a number, 0 or more")
     if min(about["hold"], about["rate"]) < 1 or not 0.0 < about["largest"] < math.inf:
         raise ValueError("'hold', 'rate' and 'largest' in 'about' must be above 0, and finite")
     return about
@@ -174,6 +178,8 @@ def _found(content: Mapping[str, Any], name: str) -> Any:
 
 def _array(content: Mapping[str, Any], name: str, kind: Any, dimensions: int) -> Any:
     array = _found(content, name)
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"'{name}' is no array")
     kinds = "iu" if kind is np.intp else "iuf"
     if array.ndim != dimensions or array.dtype.kind not in kinds or array.size > _MOST_ENTRIES:
         raise ValueError(

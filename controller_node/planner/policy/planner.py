@@ -196,7 +196,7 @@ class PolicyPlanner:
 
     def _expect(self, expected: float, features: FloatArray) -> Outlook:
         """What it expects: a cost of 0 to 1 instead of a plan's."""
-        cost = np.array([1.0 - expected])
+        cost = np.clip([1.0 - expected], 0.0, 1.0)
         centre = self._anchor.to_world(self._balance(features)[0][np.newaxis])
         return Outlook(np.zeros(1), centre, cost, cost, self._anchor)
 

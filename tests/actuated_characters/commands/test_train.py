@@ -18,7 +18,7 @@ from tests.support.physics import DATA
 from tests.support.policies import write_random_policy
 from tests.support.training import HUMANOID, make_small
 
-FEW = ["--minutes", "0.01"]  # 2 decisions a minute, see `small`
+FEW = ["--minutes", "0.01"]  # 64 decisions, see `small`
 
 
 @pytest.fixture(autouse=True)
@@ -93,6 +93,7 @@ def _options(arguments: Sequence[str]) -> object:
         (["--set", "controller_node.planner:=none"], "controller_node.planner:=none"),
         (["--set", "controller_node.policy:=x.npz"], "controller_node.policy:=x.npz"),
         (["--set", "controller_node.reference:=hold"], "reference"),
+        (["--set", "controller_node.law:=pd"], "stable_pd"),
         (["--set", "controller_node.wieght:=1"], "wieght"),
         (["--set", "sim_node.rate:=120"], "sim_node"),
     ],
@@ -152,6 +153,7 @@ def interrupted_at(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
 def test_an_interruption_keeps_the_best(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    make_small(monkeypatch, _LOOKS=10_000)  # one after each trace
     interrupted_at(monkeypatch, 3)
     monkeypatch.setattr(acceptance, "attempt", no_trials)
 
@@ -168,6 +170,7 @@ def test_an_interruption_keeps_the_best(
 def test_a_second_interruption_leaves_out_the_runs(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
+    make_small(monkeypatch, _LOOKS=10_000)
     interrupted_at(monkeypatch, 1)
 
     def interrupted(*ignored: object) -> Trial:
@@ -184,11 +187,25 @@ def test_a_second_interruption_leaves_out_the_runs(
     assert [path.name for path in tmp_path.iterdir()] == ["walk.npz"]
 
 
+def test_an_interruption_before_anything_is_worth_keeping_leaves_the_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    interrupted_at(monkeypatch, 1)
+    write_random_policy(tmp_path / "walk.npz", HUMANOID)
+    before = (tmp_path / "walk.npz").read_bytes()
+
+    with pytest.raises(Interrupted):  # the command itself says "interrupted"
+        main(["train", "--minutes", "10", "--output", "walk.npz", "--overwrite"])
+
+    assert (tmp_path / "walk.npz").read_bytes() == before
+    assert "play it" not in capsys.readouterr().out
+
+
 def test_the_help_says_what_is_trained(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["train", "--help"])
 
     said = " ".join(capsys.readouterr().out.split())
-    for each in ("--clip NAME", "--minutes M", "500,000 decisions", "policies/CHARACTER-CLIP.npz"):
-        assert each in said.replace("6,400", "500,000")
+    for each in ("--clip NAME", "--minutes M", "6,400 decisions", "policies/CHARACTER-CLIP.npz"):
+        assert each in said  # of `small`
     assert "--planner policy" in said
