@@ -194,12 +194,12 @@ def test_training_and_product_see_the_same_and_give_way_alike(
         seen.append(given[3].copy())  # type: ignore[attr-defined]
         return decide(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(product, "decide", note)
     rules, network = stage.worlds.rules, stage.network(7)
     value = Network(*network[:4], network.weights_3[:, :1].copy(), network.bias_3[:1].copy())
     about = {"hold": rules.hold, "rate": RATE, "largest": rules.largest}
     policy = Policy(about, network, value, stage.scales, stage.table.ahead, rules.unit)
     player = PolicyPlanner(HUMANOID, policy, JOB.settings.parameters)
+    monkeypatch.setattr(product, "decide", note)  # it has decided once, to be compiled
     (reference,) = JOB.references
     told, moved = [], 0.0
 

@@ -43,6 +43,12 @@ def train(training: Training) -> Policy:
     return training.best({})
 
 
+def looked_at(training: Training) -> Training:
+    """A training that has something to keep."""
+    training._look()
+    return training
+
+
 def content(policy: Policy) -> tuple[object, ...]:
     """All of a policy but the time that its training took."""
     about = {**policy.about, "trained": {**policy.about["trained"], "processor_s": None}}
@@ -110,7 +116,7 @@ def test_a_training_that_is_resumed_goes_on_from_the_policy(
 def test_it_goes_on_with_the_same_and_with_more(
     begin: Callable[..., Training], change: dict[str, object], says: str
 ) -> None:
-    policy = begin().best({})
+    policy = looked_at(begin()).best({})
     check_start(JOB, policy)
 
     with pytest.raises(ConfigurationError, match=says):
@@ -120,7 +126,7 @@ def test_it_goes_on_with_the_same_and_with_more(
 def test_networks_of_another_size_are_refused(
     begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    policy = begin().best({})
+    policy = looked_at(begin()).best({})
     monkeypatch.setattr(module, "_HIDDEN", 32)
 
     with pytest.raises(ConfigurationError, match="hidden layer: 128, this training's: 32"):
