@@ -158,7 +158,7 @@ def test_a_signal_whose_handler_raises_nothing_ends_it_all_the_same(tmp_path: Pa
     finally:
         signal.signal(signal.SIGINT, before)
 
-    assert len(read_recording(tmp_path / "run").effort) > 10
+    assert len(read_recording(tmp_path / "run").effort) >= 10  # the first state is of tick 1
 
 
 def test_real_time_is_the_walls(tmp_path: Path) -> None:
