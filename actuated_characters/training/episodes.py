@@ -24,7 +24,7 @@ from controller_node.planner.compiled.observation import find_deviation, observe
 from msgs_config.arrays import FloatArray, SingleArray
 from msgs_config.compiled import mujoco_functions as mj
 from msgs_config.compiled.borrowed import borrow
-from msgs_config.compiled.rotations import axes, product, quaternion
+from msgs_config.compiled.rotations import axes, product, quaternion, yaw_of
 
 _advance_anchor = compiled(advance_anchor)
 
@@ -229,6 +229,7 @@ def _move_reference(
     row, anchor, engine = episode.counts[0], episode.anchor, world.engine
     c, wanted = rules.scales.centre, table.features[row]
     root, wanted_root = quaternion(engine.position, 3), quaternion(table.positions[row], 3)
+    x, y, z, w = wanted_root
     spin, up = table.velocities[row, 3:6], axes(wanted_root)[2]
     place, yaw, anchor[3], anchor[4] = _advance_anchor(
         complex(anchor[0], anchor[1]),
@@ -237,7 +238,7 @@ def _move_reference(
         anchor[4],
         complex(features[c], features[c + 1]),
         complex(features[c + 3], features[c + 4]),
-        _turn_from(wanted_root, root),
+        yaw_of(product(root, (-x, -y, -z, w))),
         complex(wanted[c], wanted[c + 1]),
         complex(wanted[c + 3], wanted[c + 4]),
         up[0] * spin[0] + up[1] * spin[1] + up[2] * spin[2],
@@ -259,13 +260,3 @@ def _move_reference(
     anchor[0], anchor[1], anchor[2] = place.real, place.imag, yaw
     mj.step_before_forces(engine.model, engine.data)
     return True
-
-
-@compiled
-def _turn_from(
-    wanted: tuple[float, float, float, float], root: tuple[float, float, float, float]
-) -> float:
-    """The turn about z in rad by which a root is off another, both quaternions xyzw."""
-    x, y, z, w = wanted
-    between = product(root, (-x, -y, -z, w))
-    return 2.0 * math.atan2(between[2] * math.copysign(1.0, between[3]), abs(between[3]))

@@ -10,6 +10,7 @@ product = compiled(scalars.multiply)
 right_jacobian_inverse = compiled(scalars.right_jacobian_inverse)
 rotation_vector = compiled(scalars.log)
 to_parent = compiled(scalars.to_parent)
+yaw_of = compiled(scalars.yaw)
 
 
 @compiled
