@@ -34,7 +34,7 @@ help: ## Show this list
 venv: .venv/.installed ## Set up .venv
 
 demo: .venv/.installed ## Let the humanoid walk for 20 s and record it in runs/demo
-	$(BIN)/actuated_characters run --character humanoid --clip walk --duration 20 --output runs/demo --overwrite
+	$(BIN)/actuated_characters run --clip walk --duration 20 --planner hybrid --output runs/demo --overwrite
 	@echo "to watch it: make play (live, in the browser), or $(BIN)/actuated_characters view runs/demo (this run; needs the extra 'view')"
 
 backflip: .venv/.installed ## Let the humanoid do a backflip by its joints alone, planned; in runs/backflip

@@ -6,7 +6,12 @@ import numpy as np
 
 from controller_node.behaviours.factory import make_motion
 from controller_node.controller import Controller
-from controller_node.parameters import commanded_joints, make_controller, make_controller_settings
+from controller_node.parameters import (
+    commanded_joints,
+    describe_planner,
+    make_controller,
+    make_controller_settings,
+)
 from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
@@ -44,7 +49,7 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
         first_state=motion.first_state(),
         drives_root=ROOT in joints,
         driven=np.flatnonzero(character.layout.mask(joints)),
-        warnings=motion.warnings,
+        warnings=(*motion.warnings, *describe_planner(character, values)),
         keyframe_format=MemoryFormat(*controller.parts),
     )
 

@@ -18,6 +18,7 @@ from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller
 from controller_node.controller_settings import ControllerSettings, LawSettings
 from controller_node.effort_series import read_effort_series
+from controller_node.planner import factory
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.factory import make_planner
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
@@ -203,6 +204,11 @@ def make_controller(character: Character, reference: Reference, values: Values) 
         behaviour=choose_behaviour(character, values),
         planner=make_planner(character, values),
     )
+
+
+def describe_planner(character: Character, values: Values) -> tuple[str, ...]:
+    """What the user should know of the planner that the parameters' values say."""
+    return factory.describe_planner(character, values, make_gains(character, values))
 
 
 def check_world(values: Values, simulator: Mapping[str, object]) -> None:

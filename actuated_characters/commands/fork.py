@@ -38,7 +38,7 @@ def add_fork(commands: "Commands[argparse.ArgumentParser]") -> None:
         _ABOUT,
         [
             "fork runs/demo --at 3.2 --push chest:150,0,0@3.3",
-            "fork runs/demo --at 3.2 --set controller_node.gain_scale.p:=0.5 --duration 10",
+            "fork runs/demo --at 3.2 --set controller_node.gain_scale.p:=0.7 --duration 10",
         ],
     )
     fork.set_defaults(character=CHARACTER)  # a shell completes this character's parameters

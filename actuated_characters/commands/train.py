@@ -4,6 +4,7 @@ import argparse
 import math
 import os
 import shlex
+import signal
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,19 +17,25 @@ from actuated_characters.commands.common.settings import (
     Commands,
     add_character,
     add_command,
+    bring_parameters,
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_facts_table
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.runs.plan import RunPlan
     from actuated_characters.training.acceptance import Trial
     from actuated_characters.training.training import Job, Progress, Training
+    from controller_node.controller_settings import ControllerSettings
+    from controller_node.tracked_reference import TrackedReference
 
 _FOLDER, _SUFFIX = Path("policies"), ".npz"
 _DECISIONS_A_MINUTE = 500_000  # on two processors
 _WRAPPED_S = 60.0  # length of the last runs of a clip that goes on from its end
 _TRIALS = 5
+_NAMED_CLIPS = 3  # in the name of a file
+_USED = ("plan.weight.", "plan.gives_way")  # what training takes of a planner's parameters
 
 
 def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -95,6 +102,7 @@ def _train(options: argparse.Namespace) -> None:
     from actuated_characters.training.training import Training, check_start
     from controller_node.planner.policy.file import read_policy
 
+    began = time.process_time()
     job, start = _job(options, clips), None
     if options.resume and output.exists():
         start = read_policy(str(output), job.character)
@@ -102,7 +110,7 @@ def _train(options: argparse.Namespace) -> None:
     output.parent.mkdir(exist_ok=True)
     training = Training(job, start)
     try:
-        spent = _go_on(training, job, output)
+        spent = _go_on(training, job, output), time.process_time() - began
     finally:
         training.close()
     try:
@@ -125,9 +133,12 @@ def _go_on(training: "Training", job: "Job", output: Path) -> float:
                 bar.update(bar.task_ids[0], completed=progress.decisions, state=_words(progress))
                 if progress.is_better:
                     training.save(output, {})
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupted:
         if not training.has_best:
             raise  # so soon there is nothing better than what FILE may have
+        if interrupted.args == (signal.SIGTERM,):
+            training.save(output, {})
+            raise  # who says so does not wait for runs
         _say(f"interrupted; the best so far is in {output}, and is tried (Ctrl-C leaves that out)")
     training.save(output, {})
     return time.monotonic() - began
@@ -146,7 +157,10 @@ def _words(progress: "Progress") -> str:
 
 def _output(options: argparse.Namespace, clips: tuple[str, ...]) -> Path:
     """The policy's file; raises ConfigurationError where it cannot be written."""
-    name = f"{Path(options.character).stem}-{'-'.join(Path(clip).stem for clip in clips[:3])}"
+    names = [Path(clip).stem for clip in clips]
+    if len(names) > _NAMED_CLIPS:
+        names[_NAMED_CLIPS:] = [f"and-{len(names) - _NAMED_CLIPS}-more"]
+    name = "-".join((Path(options.character).stem, *names))
     output: Path = options.output or _FOLDER / (name + _SUFFIX)
     if output.suffix != _SUFFIX:
         raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}")
@@ -164,12 +178,11 @@ def _output(options: argparse.Namespace, clips: tuple[str, ...]) -> Path:
 
 def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     """What the options say; raises ActuatedCharactersError if it cannot be trained."""
-    from actuated_characters.runs.plan import make_plan
     from actuated_characters.training.references import TrainedReference
     from actuated_characters.training.training import Job
     from controller_node.controller_settings import check_planned
     from controller_node.parameters import make_controller_settings
-    from controller_node.planner.settings import PREDICTIVE, make_planner_settings
+    from controller_node.planner.settings import make_planner_settings
     from msgs_config.clips.reading import read_clip
 
     given = _given(options)
@@ -180,11 +193,7 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     ):
         if not least <= value < math.inf:
             raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
-    given = {**given, "planner": PREDICTIVE, "plan.workers": 1}
-    plans = [
-        make_plan(options.character, 1.0, {"reference": "clip", "clip": clip}, {}, given)
-        for clip in clips
-    ]
+    plans = [_plan(options, clip, given) for clip in clips]
     character, values = plans[0].character, plans[0].controller
     settings = make_controller_settings(character, values)
     check_planned(settings)
@@ -192,7 +201,7 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     return Job(
         character,
         [
-            TrainedReference(plan.reference, float(each.times[-1]), each.wraps)
+            TrainedReference(_tracked(plan, settings), float(each.times[-1]), each.wraps)
             for plan, each in zip(plans, frames, strict=True)
         ],
         clips,
@@ -205,14 +214,45 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     )
 
 
+def _plan(options: argparse.Namespace, clip: str, given: dict[str, object]) -> "RunPlan":
+    """A planned run of a clip, with the parameters that a reconstructed one was found with."""
+    from actuated_characters.runs.plan import make_plan
+    from controller_node.planner.settings import PREDICTIVE
+    from msgs_config.character.loading import load_character
+
+    simulator, controller = dict[str, object](), dict(given)
+    bring_parameters(load_character(options.character), clip, simulator, controller)
+    controller |= {"planner": PREDICTIVE, "plan.workers": 1}
+    return make_plan(
+        options.character, 1.0, {"reference": "clip", "clip": clip}, simulator, controller
+    )
+
+
+def _tracked(plan: "RunPlan", settings: "ControllerSettings") -> "TrackedReference":
+    """The reference of a run as its controller would track it, from the first tick on."""
+    from controller_node.tracked_reference import TrackedReference
+    from msgs_config.messages.clock import TickClock
+
+    tracked = TrackedReference(
+        plan.character, plan.reference, TickClock(plan.simulation.rate_hz), episode_ns=0
+    )
+    tracked.follows_velocity = settings.follows_velocity
+    return tracked
+
+
 def _given(options: argparse.Namespace) -> dict[str, object]:
-    """What `--set` sets; raises ConfigurationError if the command sets it."""
+    """What `--set` sets; raises ConfigurationError for what training has no use for."""
     given = node_settings(options.set, ("controller_node",))["controller_node"]
-    for name in ("planner", "policy"):
-        if name in given:
-            raise ConfigurationError(
-                f"--set controller_node.{name}:={given[name]}: it is what `train` makes"
-            )
+    for name, value in given.items():
+        if name in ("planner", "policy"):
+            reason = "it is what `train` makes"
+        elif name in ("behaviour", "reference", "clip"):
+            reason = "`train` has the behaviour tracking, and clips of --clip"
+        elif name.startswith("plan.") and not name.startswith(_USED):
+            reason = f"training searches no plans; it takes {', '.join(_USED)} alone of plan.*"
+        else:
+            continue
+        raise ConfigurationError(f"--set controller_node.{name}:={value}: {reason}")
     return given
 
 
@@ -240,14 +280,26 @@ def _try(
 
 
 def _report(
-    training: "Training", output: Path, trials: "dict[str, list[Trial]]", spent: float
+    training: "Training",
+    output: Path,
+    trials: "dict[str, list[Trial]]",
+    spent: tuple[float, float],
 ) -> None:
-    """Write the figures into the policy's file, and print them."""
+    """Write the figures into the policy's file, and print them; time spent is wall and processor's,
+    in s.
+    """
     from actuated_characters.training.acceptance import figures
 
     found = figures(trials)
     training.save(output, found)
-    facts = [("training", f"{spent / 60.0:.1f} minutes, {training.done:,} decisions")]
+    wall, processors = (each / 60.0 for each in spent)
+    facts = [
+        (
+            "training",
+            f"{training.done:,} decisions; this time {wall:.1f} minutes, {processors:.1f} of "
+            "processors",
+        )
+    ]
     facts += [
         (name, ", ".join(f"{k} {v}" for k, v in each.items())) for name, each in found.items()
     ]

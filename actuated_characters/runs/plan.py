@@ -9,7 +9,7 @@ from controller_node.behaviours.factory import BehaviourSettings, choose_behavio
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
-from controller_node.planner.settings import POLICY, PREDICTIVE, PlannerParameters
+from controller_node.planner.settings import NO_PLANNER, RECORDED, PlannerParameters
 from controller_node.references.base import Motion, Reference
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -116,7 +116,7 @@ def make_plan(
     controller, motion = _controller_values(character, controller_given)
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
-    stands_by_itself = PlannerParameters.of(controller).planner in (PREDICTIVE, POLICY)
+    stands_by_itself = PlannerParameters.of(controller).planner not in (NO_PLANNER, RECORDED)
     if stands_by_itself or BehaviourSettings.of(controller).behaviour == STATE_MACHINE:
         defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
@@ -125,6 +125,7 @@ def make_plan(
     _check_engines(character, settings.world)
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings
+    warnings += controller_parameters.describe_planner(character, controller)
     warnings += describe_start(character, simulator) + describe_speed_bound(character, settings)
     warnings += describe_default_engine(settings.world.engine)
     return RunPlan(character, motion.reference, simulator, controller, warnings)

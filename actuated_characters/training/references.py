@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.training.episode_types import Table
+from controller_node.planner.compiled.features import FeatureLayout
 from controller_node.planner.compiled.observation import (
-    FRAME_VECTORS,
     ObservationScales,
     heading,
     observe,
@@ -15,7 +15,7 @@ from controller_node.planner.compiled.observation import (
 )
 from controller_node.planner.compiled.rollout import RolloutModel, features_of
 from controller_node.planner.contact_model import ContactModel
-from controller_node.references.base import Reference
+from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray, IntArray
 
 _AHEAD_S = (0.0, 0.1, 0.3)  # how far the frames that a policy is told of are ahead
@@ -30,7 +30,7 @@ _WIDE = 4.0  # spreads that count as one: entries of a frame vary together
 class TrainedReference:
     """A reference, and where its episodes may begin."""
 
-    reference: Reference
+    reference: TrackedReference  # as a controller would track it
     cycle_s: float  # until which they may begin
     wraps: bool  # whether it goes on from its end
 
@@ -51,7 +51,7 @@ def make_table(
         if each.wraps:
             seconds = max(seconds, _WRAPPED_S)
         count = round(seconds * rate_hz) + int(ahead[-1]) + 2
-        parts.append(_sample(model, body, each.reference, count, rate_hz))
+        parts.append(_sample(model, body, each.reference, count))
         begin = max(round(each.cycle_s * rate_hz), 1)
         starts.append(np.arange(first, first + begin, dtype=np.intp))
         first += count
@@ -63,34 +63,32 @@ def make_table(
 
 
 def _sample(
-    model: ContactModel, body: RolloutModel, reference: Reference, count: int, rate_hz: int
+    model: ContactModel, body: RolloutModel, reference: TrackedReference, count: int
 ) -> tuple[FloatArray, ...]:
     engine = model.engine()
-    states = [reference.sample(tick / rate_hz) for tick in range(count)]
+    states = [reference.desired_at(tick) for tick in range(count)]
     positions = np.array([model.position_of(state.configuration.position) for state in states])
     velocities = np.array([state.velocity for state in states])
-    centre, n = 2 * velocities.shape[1] - 6, velocities.shape[1]
-    features = np.zeros((count, model.feature_count))
-    ends = model.feature_count - centre - 9
-    frames = np.zeros((count, FRAME_VECTORS + ends + n - 6))
+    layout = model.feature_layout
+    features = np.zeros((count, layout.size))
+    frames = np.zeros((count, layout.frame_size))
     for tick, state in enumerate(states):
         features_of(features[tick], positions[tick], velocities[tick], body, engine)
         joints = state.configuration.position[6:].copy()
-        write_frame(frames[tick], positions[tick], joints, features[tick], centre)
+        write_frame(frames[tick], positions[tick], joints, features[tick], layout.centre)
     facing = np.array([heading(position, model.left) for position in positions])
     return positions, velocities, features, frames, facing
 
 
-def make_scales(table: Table, starts: Sequence[IntArray]) -> ObservationScales:
+def make_scales(
+    table: Table, starts: Sequence[IntArray], layout: FeatureLayout
+) -> ObservationScales:
     """Scales of observations: fixed for deviations, of frames by how they vary."""
-    size, joints = table.features.shape[1], table.velocities.shape[1] - 6
-    centre = 2 * joints + 6
-    ends = size - centre - 9
-    deviation = np.repeat(_DEVIATIONS, (3, joints, 3, joints, 3, 3, 3, ends))
+    centre, deviation = layout.centre, np.repeat(_DEVIATIONS, layout.sizes)
     shape = (len(table.ahead), table.frames.shape[1])
     plain = ObservationScales(deviation, np.zeros(shape), np.ones(shape), centre)
     told = np.array([_told(table, int(row), plain) for row in np.concatenate(starts)])
-    least = np.repeat(_LEAST_SPREADS, (3, 3, 3, 3, ends, joints))
+    least = np.repeat(_LEAST_SPREADS, layout.frame_sizes)
     spread = _WIDE * np.maximum(told.std(axis=0), least)
     return ObservationScales(deviation, told.mean(axis=0), spread, centre)
 

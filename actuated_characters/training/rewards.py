@@ -4,6 +4,7 @@ import math
 
 from actuated_characters.training.decorator import compiled
 from actuated_characters.training.episode_types import Rules
+from controller_node.planner.compiled.features import STEP_TIME
 from msgs_config.arrays import FloatArray, SingleArray
 
 _LOST_TURN = 1.2  # rad of the root off the reference's, at which an episode is lost
@@ -11,7 +12,6 @@ _LOST_HEIGHT = 0.3  # m of the centre of mass above or below the reference's
 _COSTS = (15.0, 60.0, 300.0)  # at which a third of the reward is down to 1 / e
 _PERTURBED = 0.5  # share of the reward that is left while the reference gives way
 _EFFORT_COST = 0.002  # reward, of an action of one
-_STEP_TIME = 0.2  # s, see `controller_node.planner.search.cost`
 
 
 @compiled
@@ -47,7 +47,7 @@ def cost_of(deviation: FloatArray, gives_way: bool, rules: Rules) -> float:
     if gives_way:
         for first in rules.feet:
             for i in range(2):
-                step = deviation[c + i] + _STEP_TIME * deviation[c + 3 + i]
+                step = deviation[c + i] + STEP_TIME * deviation[c + 3 + i]
                 cost += _change(deviation[first + i], step, weights[first + i])
         for first in rules.hands:
             for i in range(3):

@@ -21,7 +21,7 @@ from controller_node.planner.compiled.rollout import MOST_BOUNDS, RolloutModel
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.search.cost import ResidualModel
 from controller_node.planner.settings import OWN_CONTACTS, WORLD_CONTACTS, PlannerSettings
-from msgs_config.arrays import IntArray, SingleArray
+from msgs_config.arrays import FloatArray, IntArray, SingleArray
 from msgs_config.character.model import Character
 from msgs_config.compiled.soft_limits import room_for_bounds
 from msgs_config.runtime.worker_threads import WorkerThreads
@@ -39,6 +39,11 @@ def hold_ticks(rate_hz: int) -> int:
     return max(round(HOLD_S * rate_hz), 1)
 
 
+def action_unit(settings: PlannerSettings) -> FloatArray:
+    """The offset (a,) in rad or m of an action of one."""
+    return _UNIT * settings.sigma
+
+
 class TrainingWorlds:
     """Worlds whose contacts, friction and mass differ, in which episodes go on for good."""
 
@@ -49,10 +54,9 @@ class TrainingWorlds:
         gains: GainArrays,
         *,
         threads: int,
-        rng: np.random.Generator,
     ) -> None:
         """Build the models, one a kind of contacts, and for each thread what simulates them."""
-        self._settings, self._rng = settings, rng
+        self._settings = settings
         given = settings.parameters
         models = [
             ContactModel(
@@ -81,10 +85,19 @@ class TrainingWorlds:
         self._threads.close()
 
     def begin(
-        self, table: Table, starts: Sequence[IntArray], scales: ObservationScales, count: int
+        self,
+        table: Table,
+        starts: Sequence[IntArray],
+        scales: ObservationScales,
+        count: int,
+        rng: np.random.Generator,
     ) -> None:
-        """Begin an episode of some reference in each of so many worlds."""
+        """Begin an episode of some reference in each of so many worlds.
+
+        `rng` is of all that is random from now on.
+        """
         self._table, self._starts, self._rules = table, starts, self._make_rules(scales)
+        self._rng = rng
         n = table.velocities.shape[1]
         self._episodes = [
             Episode(
@@ -144,7 +157,7 @@ class TrainingWorlds:
         return Rules(
             hold_ticks(settings.parameters.rate_hz),
             1.0 / settings.parameters.rate_hz,
-            _UNIT * settings.sigma,
+            action_unit(settings),
             LARGEST_ACTION,
             residuals.weights,
             residuals.loose_weights,

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.compiled.features import Watched
+from controller_node.planner.compiled.features import FeatureLayout, Watched
 from controller_node.planner.compiled.law import Joints
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.settings import OWN_CONTACTS, PlannerParameters
@@ -101,9 +101,14 @@ class ContactModel:
         return self._model
 
     @property
+    def feature_layout(self) -> FeatureLayout:
+        """Where the parts of features are."""
+        return FeatureLayout(self._character.layout.size - 6, len(self.end_effectors))
+
+    @property
     def feature_count(self) -> int:
         """Length f of a row of `write_features`."""
-        return 2 * self._character.layout.size - 6 + 9 + 3 * len(self.end_effectors)
+        return self.feature_layout.size
 
     def position_of(self, position: FloatArray) -> FloatArray:
         """A position (n,), message form, as MuJoCo has it (q,)."""

@@ -3,11 +3,16 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from controller_node.control_laws import GainArrays
 from controller_node.planner.base import Planner
 from controller_node.planner.recorded import RecordedPlanner
 from controller_node.planner.settings import (
+    HYBRID,
     NO_PLANNER,
     POLICY,
+    PREDICTIVE,
     RECORDED,
     PlannerParameters,
     check_planner,
@@ -34,9 +39,10 @@ def check_planning(character: Character, values: Values) -> None:
     check_planner(character, name)
     if name == RECORDED:
         _recorded_plan(character, values)
-    elif name == POLICY:
+        return
+    if name in (POLICY, HYBRID):
         _read_policy(character, values)
-    else:
+    if name in (PREDICTIVE, HYBRID):
         make_planner_settings(character, values)
 
 
@@ -61,9 +67,33 @@ def make_planner(character: Character, values: Values) -> Planner | None:
 
         return PolicyPlanner(character, policy, given, make_commands_in_flight(character, given))
     settings = make_planner_settings(character, values)
+    if name == HYBRID:
+        policy = _read_policy(character, values)
+        from controller_node.planner.policy.hybrid import HybridPlanner
+
+        return HybridPlanner(character, policy, settings)
     from controller_node.planner.planner import PredictivePlanner  # compiled code, for it alone
 
     return PredictivePlanner(character, settings)
+
+
+def describe_planner(character: Character, values: Values, gains: GainArrays) -> tuple[str, ...]:
+    """Where a policy is used otherwise than it was trained, which the user should read."""
+    given = PlannerParameters.of(values)
+    if given.planner not in (POLICY, HYBRID):
+        return ()
+    policy = _read_policy(character, values)
+    about = policy.about
+    same = {
+        "stiffness": np.allclose(policy.stiffness, gains.stiffness),
+        "damping": np.allclose(policy.damping, gains.damping),
+        "gravity": np.isclose(about["gravity"], given.gravity),
+        "mass": np.isclose(about["mass"], character.mass, rtol=1e-3),
+    }
+    others = [name for name, is_same in same.items() if not is_same]
+    if not others:
+        return ()
+    return (f"the policy was trained with other {', '.join(others)}: it may fall where it did not",)
 
 
 def _read_policy(character: Character, values: Values) -> "Policy":

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.anchor import Anchor, PlanarState, planar_state
+from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.commands_in_flight import CommandsInFlight
 from controller_node.planner.compiled.rollout import RolloutModel
@@ -33,6 +33,7 @@ from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.geometry import fixed_order
 from msgs_config.messages.state import StampedState
 
 _PATIENCE = 0.005  # s between two looks at what else there is to do
@@ -96,7 +97,8 @@ class PredictivePlanner:
         self._episode = 0
         self._plan: Plan | None = None
         self._coming: PendingPlan | None = None
-        self._anchor = Anchor()
+        self.anchor = Anchor()
+        """Where the reference's world is, for the next plan."""
         self._compile(character)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -105,7 +107,7 @@ class PredictivePlanner:
         if coming is not None:
             coming = replace(coming, plan=_FoundPlan(coming.plan.result()))
         sent = {} if self.in_flight is None else self.in_flight.sent()
-        state = (self._seed, self._episode, self._plan, coming, self._anchor, sent)
+        state = (self._seed, self._episode, self._plan, coming, self.anchor, sent)
         return _copy_of, (self._made_of, state)
 
     @property
@@ -139,11 +141,11 @@ class PredictivePlanner:
         """What it goes on from while no plan is sought, for this planner or an equal one."""
         assert self._coming is None
         late = self.in_flight
-        return PlannerSnapshot(self._plan, self._anchor, {} if late is None else late.sent())
+        return PlannerSnapshot(self._plan, self.anchor, {} if late is None else late.sent())
 
     def restore(self, snapshot: PlannerSnapshot, seed: int) -> None:
         """Go on from a snapshot, with samples of a seed."""
-        self._seed, self._plan, self._anchor = seed, snapshot.plan, snapshot.anchor
+        self._seed, self._plan, self.anchor = seed, snapshot.plan, snapshot.anchor
         self._coming = None
         if self.in_flight is not None:
             self.in_flight.restore(snapshot.sent)
@@ -156,7 +158,7 @@ class PredictivePlanner:
 
     def rest(self) -> None:
         """Forget the plan, and where the reference had given way to: nothing is tracked."""
-        self._plan, self._coming, self._anchor = None, None, Anchor()
+        self._plan, self._coming, self.anchor = None, None, Anchor()
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -190,7 +192,13 @@ class PredictivePlanner:
         """
         body, position = self._model.body(gains), self._model.position_of(state.position)
         features = self._rollouts.features_of(position, state.velocity.copy(), body)
-        return self._search.cost(features, self._reference.target(tick, desired_at, body).features)
+        wanted = self._reference.target(tick, desired_at, body).features
+        return self.cost_of(features - wanted, perturbed=False)
+
+    def cost_of(self, deviation: FloatArray, *, perturbed: bool) -> float:
+        """What a deviation of features (f,) from the reference's costs."""
+        residuals = self._residual_model.residuals(deviation, perturbed=perturbed)
+        return self.settings.checks * float(fixed_order.dot(residuals, residuals))
 
     def cost_ahead(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -216,7 +224,7 @@ class PredictivePlanner:
         desired = self._reference.ahead(0, lambda _: still, body)
         position = self._model.position_of(rest)
         self._search.rehearse(
-            Start(0, position, nothing, desired, body, self._anchor, perturbed=False)
+            Start(0, position, nothing, desired, body, self.anchor, perturbed=False)
         )
         self._reference.clear()
 
@@ -236,7 +244,7 @@ class PredictivePlanner:
     def _abandon_search(self) -> None:
         """Seek no plan, as if none had been sought since the one in force."""
         if self._coming is not None and self._plan is not None:
-            self._anchor = self._plan.outlook.anchor
+            self.anchor = self._plan.outlook.anchor
         self._coming = None
 
     def _take(self, tick: int) -> None:
@@ -266,8 +274,8 @@ class PredictivePlanner:
                 position, velocity, offsets, between, body
             )
         desired = self._reference.ahead(acts, desired_at, body)
-        perturbed = self._anchor.is_perturbed(tick / self._rate_hz)
-        start = Start(tick, position, velocity, desired, body, self._anchor, perturbed)
+        perturbed = self.anchor.is_perturbed(tick / self._rate_hz)
+        start = Start(tick, position, velocity, desired, body, self.anchor, perturbed)
         seed = (self._seed, self._episode)
         return PendingPlan(
             tick, acts, self._thread.submit(self._search.find, start, self._plan, seed)
@@ -282,27 +290,23 @@ class PredictivePlanner:
         velocity = state.velocity.copy()
         if not self.settings.parameters.gives_way:
             return position, velocity
-        seen = self._anchor.to_reference_world(position, velocity)
-        features = self._rollouts.features_of(*seen, body)
+        seen = self.anchor.to_reference_world(position, velocity)
+        look = ReferenceSample(*seen, self._rollouts.features_of(*seen, body))
         since_plan = tick - (tick if self._plan is None else self._plan.seen)
-        self._anchor = self._anchor.advanced(
-            self._planar(*seen, features),
-            self._planar(target.position, target.velocity, target.features),
+        centre = self._residual_model.centre
+        self.anchor = self.anchor.advanced(
+            look.planar(centre),
+            target.planar(centre),
             tick / self._rate_hz,
             since_plan / self._rate_hz,
         )
-        return self._anchor.to_reference_world(position, velocity)
-
-    def _planar(
-        self, position: FloatArray, velocity: FloatArray, features: FloatArray
-    ) -> PlanarState:
-        return planar_state(position, velocity, *self._residual_model.balance(features))
+        return self.anchor.to_reference_world(position, velocity)
 
 
 def _copy_of(made_of: tuple[Character, PlannerSettings], state: Any) -> object:
     """The copy of a planner that was made of these, in its state."""
     copy = PredictivePlanner(*made_of)
-    copy._seed, copy._episode, copy._plan, copy._coming, copy._anchor, sent = state
+    copy._seed, copy._episode, copy._plan, copy._coming, copy.anchor, sent = state
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)
     return copy

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.planner.anchor import PlanarState, planar_state
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.rollout import Desired, RolloutModel
 from controller_node.planner.contact_model import ContactModel
@@ -15,11 +16,16 @@ from msgs_config.arrays import FloatArray
 
 @dataclass(frozen=True)
 class ReferenceSample:
-    """The reference at one tick."""
+    """The reference at one tick, or a state in its world."""
 
     position: FloatArray  # (q,) as MuJoCo has it
     velocity: FloatArray  # (n,)
     features: FloatArray  # (f,)
+
+    def planar(self, centre: int) -> PlanarState:
+        """How it moves over the ground; `centre` is the place of the centre of mass in features."""
+        balance = self.features[centre : centre + 3], self.features[centre + 3 : centre + 6]
+        return planar_state(self.position, self.velocity, *balance)
 
 
 @dataclass(frozen=True)

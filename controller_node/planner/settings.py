@@ -18,6 +18,7 @@ NO_PLANNER = "none"
 PREDICTIVE = "predictive"
 RECORDED = "recorded"
 POLICY = "policy"
+HYBRID = "hybrid"
 
 OWN_CONTACTS = "own"
 WORLD_CONTACTS = "world"
@@ -58,15 +59,15 @@ class PlannerParameters(Settings, prefix="plan."):
     planner: str = parameter(
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
-        "model of the world, the plan that is in the clip's file (of `motion reconstruct`), or a "
-        "trained policy",
+        "model of the world, the plan that is in the clip's file (of `motion reconstruct`), a "
+        "trained policy, or a policy while it is calm and planning ahead while it is not",
         name="planner",
-        choices=(NO_PLANNER, PREDICTIVE, RECORDED, POLICY),
+        choices=(NO_PLANNER, PREDICTIVE, RECORDED, POLICY, HYBRID),
     )
     policy: str = parameter(
         "",
-        "of planner policy: a shipped policy's name, or a file of `train`; empty: the one that is "
-        "shipped for the clip",
+        "of planners policy and hybrid: a shipped policy's name, or a file of `train`; empty: the "
+        "one that is shipped for the clip",
         name="policy",
     )
     horizon: float = parameter(0.8, "how far it looks", unit="s", minimum=0.05, maximum=5.0)

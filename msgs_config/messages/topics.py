@@ -359,7 +359,8 @@ PLAN = Topic(
         "one point per check: the expected centre of mass (`x`, `y`, `z`, world) at `time` "
         "s after that state, the cost of the deviations there for the plan and for the best "
         "other candidate (`cost`, `alternative`), and the place of the reference's world "
-        "(`anchor_x`, `anchor_y`, `anchor_yaw`, m and rad)"
+        "(`anchor_x`, `anchor_y`, `anchor_yaw`, m and rad); of a policy, one per decision, with "
+        "one point: where the centre of mass is, and 1 less what is expected of it"
     ),
 )
 CLOCK = Topic(

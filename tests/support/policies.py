@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from controller_node.parameters import make_gains, resolve_for
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.compiled.observation import FRAME_VECTORS, ObservationScales
 from controller_node.planner.policy.file import Policy, write_policy
@@ -49,6 +50,8 @@ def random_policy(
         "clips": ["walk"],
         "rate": rate,
         "hold": hold,
+        "mass": character.mass,
+        "gravity": 9.81,
         "largest": largest,
         "trained": {},
         "figures": {},
@@ -60,7 +63,14 @@ def random_policy(
         scales,
         np.array(AHEAD, dtype=np.intp),
         np.full(actions, UNIT),
+        *(gains(character, rate)),
     )
+
+
+def gains(character: Character, rate: int) -> tuple[FloatArray, FloatArray]:
+    """The stiffness and damping (n,) that a character has by default."""
+    found = make_gains(character, resolve_for(character, {"rate": rate}))
+    return found.stiffness, found.damping
 
 
 def write_random_policy(path: Path, character: Character, *, hold: int = 8, seed: int = 0) -> Path:

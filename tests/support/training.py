@@ -12,7 +12,9 @@ from actuated_characters.training.references import TrainedReference
 from actuated_characters.training.training import Job
 from controller_node.parameters import make_controller_settings
 from controller_node.planner.settings import make_planner_settings
+from controller_node.tracked_reference import TrackedReference
 from msgs_config.clips.reading import read_clip
+from msgs_config.messages.clock import TickClock
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
@@ -25,9 +27,11 @@ def walking_job(**given: object) -> Job:
     clip = {"reference": "clip", "clip": "walk"}
     plan = make_plan("humanoid", 1.0, clip, {}, {"planner": "predictive", "plan.workers": 1})
     frames = read_clip(HUMANOID, "walk")
+    clock = TickClock(plan.simulation.rate_hz)
+    tracked = TrackedReference(plan.character, plan.reference, clock, episode_ns=0)
     job = Job(
         HUMANOID,
-        [TrainedReference(plan.reference, float(frames.times[-1]), frames.wraps)],
+        [TrainedReference(tracked, float(frames.times[-1]), frames.wraps)],
         ("walk",),
         make_planner_settings(HUMANOID, plan.controller),
         make_controller_settings(HUMANOID, plan.controller).gains,

@@ -9,6 +9,7 @@ _is_interrupted = False
 class Interrupted(KeyboardInterrupt):
     """Not KeyboardInterrupt itself: where that goes through code that was made from a text, such
     as a dataclass's, Python remembers it, and in the end kills a module that was run by `-m`.
+    Its argument is the signal's number.
     """
 
 
@@ -31,6 +32,6 @@ def check_interruption() -> None:
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     global _is_interrupted
-    del number, frame
+    del frame
     _is_interrupted = True
-    raise Interrupted
+    raise Interrupted(number)

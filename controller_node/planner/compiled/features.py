@@ -11,6 +11,45 @@ from msgs_config.compiled import mass_matrix
 from msgs_config.compiled.mass_matrix import Tree
 from msgs_config.compiled.rotations import axes, quaternion, to_parent, turn_between
 
+STEP_TIME = 0.2  # s: feet go ahead of a pushed centre of mass by this times its velocity
+
+
+class FeatureLayout(NamedTuple):
+    """Where the parts of features are, and those of a frame of `write_frame`."""
+
+    joints: int  # entries of the actuated joints, n - 6
+    ends: int  # end effectors
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Entries of each part, in the order of `write_features`."""
+        return 3, self.joints, 3, self.joints, 3, 3, 3, 3 * self.ends
+
+    @property
+    def centre(self) -> int:
+        """Where the centre of mass begins."""
+        return 6 + 2 * self.joints
+
+    @property
+    def first_end(self) -> int:
+        """Where the end effectors begin."""
+        return self.centre + 9
+
+    @property
+    def size(self) -> int:
+        """Length f of a row of features."""
+        return self.first_end + 3 * self.ends
+
+    @property
+    def frame_sizes(self) -> tuple[int, ...]:
+        """Entries of each part of a frame, in the order of `write_frame`."""
+        return 3, 3, 3, 3, 3 * self.ends, self.joints
+
+    @property
+    def frame_size(self) -> int:
+        """Length d of a frame."""
+        return 12 + 3 * self.ends + self.joints
+
 
 class Watched(NamedTuple):
     """What the features are made of."""

@@ -1,15 +1,15 @@
 """A trained policy's file: a network, what it is told, what it answers, and what it was trained on.
 
 An archive of numpy (`.npz`) without pickled objects. `about` is a JSON text: format, character,
-clips, rate, ticks of a decision, largest action, what it was trained with and the figures that it
-was accepted with; the arrays have the names of the fields of `Network` and `ObservationScales`.
+its mass, clips, rate, ticks of a decision, largest action, gravity, what it was trained with and
+the figures that it was accepted with; the arrays have the names of the fields of `Network`,
+`ObservationScales` and `Policy`.
 """
 
 import io
 import json
 import math
 import zipfile
-import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from controller_node.planner.compiled.features import FeatureLayout
 from controller_node.planner.compiled.network import Network
-from controller_node.planner.compiled.observation import FRAME_VECTORS, ObservationScales
+from controller_node.planner.compiled.observation import ObservationScales
 from msgs_config.arrays import FloatArray, IntArray, SingleArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
@@ -28,7 +29,7 @@ from msgs_config.whole_files import write_whole
 SHIPPED = Path(__file__).parent / "shipped"
 SUFFIX = ".npz"
 _FORMAT = 1
-_MOST_ENTRIES = 10_000_000  # of one array; more is no policy of ours
+_LARGEST_ARRAY = 80_000_000  # bytes
 _ABOUT: Mapping[str, tuple[type | tuple[type, ...], str]] = {
     "character": (str, "a text"),
     "dofs": (list, "a list of names"),
@@ -36,16 +37,14 @@ _ABOUT: Mapping[str, tuple[type | tuple[type, ...], str]] = {
     "rate": (int, "a whole number"),
     "hold": (int, "a whole number"),
     "largest": ((int, float), "a number"),
+    "mass": ((int, float), "a number"),
+    "gravity": ((int, float), "a number"),
     "trained": (dict, "a mapping"),
     "figures": (dict, "a mapping"),
 }
 _NETWORK = tuple(f"policy.{name}" for name in Network._fields)
 _VALUE = tuple(f"value.{name}" for name in Network._fields)
 _SCALES = ("deviation", "frame_mean", "frame_scale")
-_MALFORMED = (  # what numpy, its archives and JSON raise for a file that is none of theirs
-    *(OSError, ValueError, TypeError, EOFError, MemoryError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error),
-)
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,8 @@ class Policy:
     scales: ObservationScales
     ahead: IntArray  # (frames,) ticks from now to the frames of the reference that it is told
     unit: FloatArray  # (a,) rad or m, offset of an action of one
+    stiffness: FloatArray  # (n,) of the law that it was trained with
+    damping: FloatArray  # (n,)
 
     @property
     def hold(self) -> int:
@@ -100,7 +101,7 @@ def write_policy(path: Path, policy: Policy) -> None:
     arrays: dict[str, Any] = dict(zip(_NETWORK, policy.network, strict=True))
     arrays |= dict(zip(_VALUE, policy.value, strict=True))
     arrays |= {name: getattr(policy.scales, name) for name in _SCALES}
-    arrays |= {"ahead": policy.ahead, "unit": policy.unit}
+    arrays |= {name: getattr(policy, name) for name in ("ahead", "unit", "stiffness", "damping")}
     about = json.dumps({**policy.about, "format": _FORMAT})
     content = io.BytesIO()
     np.savez_compressed(content, about=np.array(about), **arrays)
@@ -117,14 +118,23 @@ def read_policy(name_or_path: str, character: Character) -> Policy:
     try:
         if not zipfile.is_zipfile(path):
             raise ValueError(f"it is no archive of numpy ({SUFFIX})")
+        _check_size(path)
         with np.load(path, allow_pickle=False) as archive:
             content = {name: archive[name] for name in archive.files}
         policy = _policy(content, character)
-    except _MALFORMED as error:
+    except Exception as error:  # numpy, its archives and JSON raise anything for what is not theirs
         reason = str(error) or type(error).__name__
         raise ConfigurationError(f"{path} is no policy's file of `train`: {reason}") from error
     _check_character(path, policy, character)
     return policy
+
+
+def _check_size(path: Path) -> None:
+    """Raise ValueError if the archive is larger than any policy's, before anything is unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        size = max((entry.file_size for entry in archive.infolist()), default=0)
+    if size > _LARGEST_ARRAY:
+        raise ValueError(f"it has an array of {size:,} bytes; {_LARGEST_ARRAY:,} is the most")
 
 
 def _policy(content: Mapping[str, Any], character: Character) -> Policy:
@@ -143,9 +153,9 @@ def _policy(content: Mapping[str, Any], character: Character) -> Policy:
         about,
         _network(content, _NETWORK),
         _network(content, _VALUE),
-        ObservationScales(deviation, mean, scale, 2 * character.layout.size - 6),
+        ObservationScales(deviation, mean, scale, _layout(character).centre),
         ahead,
-        _array(content, "unit", float, 1),
+        *(_array(content, name, float, 1) for name in ("unit", "stiffness", "damping")),
     )
 
 
@@ -161,13 +171,22 @@ def _read_about(content: Mapping[str, Any]) -> Mapping[str, Any]:
             raise ValueError(f"'{name}' in 'about' must be {words}")
     if not all(isinstance(name, str) for name in (*about["dofs"], *about["clips"])):
         raise ValueError("'dofs' and 'clips' in 'about' must be lists of names")
-    for name in ("decisions", "pushes_ns", "processor_s"):
+    for name in ("decisions", "pushes_ns"):
         number = about["trained"].get(name, 0)
         if not isinstance(number, int | float) or not 0 <= number < math.inf:
             raise ValueError(f"'{name}' of 'trained' in 'about' must be a number, 0 or more")
     if min(about["hold"], about["rate"]) < 1 or not 0.0 < about["largest"] < math.inf:
         raise ValueError("'hold', 'rate' and 'largest' in 'about' must be above 0, and finite")
+    if not 0.0 < about["mass"] < math.inf or not 0.0 <= about["gravity"] < math.inf:
+        raise ValueError("'mass' in 'about' must be above 0, 'gravity' at least 0, both finite")
     return about
+
+
+def _layout(character: Character) -> FeatureLayout:
+    """That of `ContactModel.feature_layout`, without building the model."""
+    parents = {link.parent for link in character.links}
+    ends = len(set(range(len(character.links))) - parents)
+    return FeatureLayout(character.layout.size - 6, ends)
 
 
 def _found(content: Mapping[str, Any], name: str) -> Any:
@@ -181,10 +200,10 @@ def _array(content: Mapping[str, Any], name: str, kind: Any, dimensions: int) ->
     if not isinstance(array, np.ndarray):
         raise ValueError(f"'{name}' is no array")
     kinds = "iu" if kind is np.intp else "iuf"
-    if array.ndim != dimensions or array.dtype.kind not in kinds or array.size > _MOST_ENTRIES:
+    if array.ndim != dimensions or array.dtype.kind not in kinds:
         raise ValueError(
             f"'{name}' is {array.dtype} of shape {array.shape}; it must be {np.dtype(kind)}, its "
-            f"dimensions {dimensions}, its entries at most {_MOST_ENTRIES}"
+            f"dimensions {dimensions}"
         )
     with np.errstate(over="ignore"):
         converted = np.ascontiguousarray(array, dtype=kind)
@@ -208,16 +227,15 @@ def _network(content: Mapping[str, Any], names: tuple[str, ...]) -> Network:
 def _check_character(path: Path, policy: Policy, character: Character) -> None:
     """Raise ConfigurationError if shapes or names are not the character's."""
     layout, about = character.layout, policy.about
-    parents = {link.parent for link in character.links}
-    ends = 3 * len(set(range(len(character.links))) - parents)
-    features = 2 * layout.size + 3 + ends
-    frame = FRAME_VECTORS + ends + layout.size - 6
+    features, frame = _layout(character).size, _layout(character).frame_size
     shapes = {
         "dofs": (list(about["dofs"]), list(layout.dof_names)),
         "deviation": (policy.scales.deviation.shape, (features,)),
         "frame_mean": (policy.scales.frame_mean.shape, (len(policy.ahead), frame)),
         "frame_scale": (policy.scales.frame_scale.shape, (len(policy.ahead), frame)),
         "unit": (policy.unit.shape, (layout.size - 6,)),
+        "stiffness": (policy.stiffness.shape, (layout.size,)),
+        "damping": (policy.damping.shape, (layout.size,)),
         "policy": (_ends(policy.network), (features + policy.ahead.size * frame, layout.size - 6)),
         "value": (_ends(policy.value), (features + policy.ahead.size * frame, 1)),
     }

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.anchor import Anchor, planar_state
+from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.observation import (
     decide,
@@ -25,6 +25,7 @@ from controller_node.planner.compiled.rollout import RolloutModel, features_agai
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.policy.file import Policy
+from controller_node.planner.sampled_reference import ReferenceSample
 from controller_node.planner.settings import PlannerParameters
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
@@ -36,12 +37,9 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Told:
+class Told(ReferenceSample):
     """The reference at one tick, as a policy is told of it."""
 
-    position: FloatArray  # (q,) MuJoCo's
-    velocity: FloatArray  # (n,)
-    features: FloatArray  # (f,)
     frame: FloatArray  # (d,)
     facing: float  # rad
 
@@ -70,7 +68,8 @@ class PolicyPlanner:
     def __reduce__(self) -> tuple[object, ...]:
         """For a copy, in this process or another: it goes on alike."""
         sent = None if self.in_flight is None else self.in_flight.sent()
-        state = (self._offset, self._decided, self._anchor, self.outlook, sent)
+        looked = (self.anchor, self.outlook, self.last_deviation)
+        state = (self._offset, self._decided, looked, sent)
         return _copy_of, (self._made_of, state)
 
     @property
@@ -98,8 +97,11 @@ class PolicyPlanner:
         """Forget the decision, and where the reference had given way to: nothing is tracked."""
         self._offset: FloatArray | None = None
         self._decided = 0
-        self._anchor = Anchor()
+        self.anchor = Anchor()
+        """Where the reference's world is."""
         self.outlook: Outlook | None = None
+        self.last_deviation: FloatArray | None = None
+        """What the last decision answered: see `deviation`."""
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -123,57 +125,59 @@ class PolicyPlanner:
         self._decide(0, StampedState(0, rest, nothing, None), gains, lambda _: still)
         self.begin_episode(0)
 
+    def deviation(
+        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+    ) -> FloatArray:
+        """By how much a state is off the reference, where that has given way to: features (f,)."""
+        body = self._body_of(gains)
+        now = self._tell(tick, desired_at, body)
+        return self._off(self._look(state, now, body), now)
+
+    def _body_of(self, gains: GainArrays) -> RolloutModel:
+        if gains is not self._gains:
+            self._gains, self._body = gains, self._model.body(gains)
+        return self._body
+
     def _decide(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
-        if gains is not self._gains:
-            self._gains, self._body = gains, self._model.body(gains)
-        policy, body = self._policy, self._body
+        policy, body = self._policy, self._body_of(gains)
         frames = [self._tell(tick + ahead, desired_at, body) for ahead in policy.ahead.tolist()]
         for known in [known for known in self._told if known < tick]:
             del self._told[known]
-        now, position = frames[0], self._model.position_of(state.position)
-        velocity = state.velocity.copy()  # a message's cannot be written to, another type to numba
-        features = self._look(tick, position, velocity, now, body)
-        deviation = np.empty(len(features))
-        find_deviation(deviation, features, now.features, now.facing, self._centre)
+        now, look = frames[0], self._look(state, frames[0], body)
+        if self._given.gives_way and self._follow(tick, look, now):
+            look = self._look(state, now, body)
+        self.last_deviation = deviation = self._off(look, now)
         told = np.array([each.frame for each in frames])
-        observation = np.empty(len(features) + told.size, np.float32)
+        observation = np.empty(len(deviation) + told.size, np.float32)
         observe(observation, deviation, told, now.facing, policy.scales)
-        offset = np.zeros(len(velocity))
+        offset = np.zeros(len(state.velocity))
         expected = decide(
             offset[6:], policy.network, policy.value, observation, policy.unit, policy.largest
         )
-        self.outlook = self._expect(expected, features)
+        self.outlook = self._expect(expected, look.features)
         return offset
 
-    def _look(
-        self, tick: int, position: FloatArray, velocity: FloatArray, now: Told, body: RolloutModel
-    ) -> FloatArray:
-        """The features (f,) of a state in the reference's world, which may give way to it."""
-        seen = self._anchor.to_reference_world(position, velocity)
-        features = self._features(*seen, now.position, body)
-        if not self._given.gives_way:
-            return features
-        rate = self._given.rate_hz
-        elapsed = 0.0 if self._offset is None else (tick - self._decided) / rate
-        before = self._anchor
-        self._anchor = before.advanced(
-            planar_state(*seen, *self._balance(features)),
-            planar_state(now.position, now.velocity, *self._balance(now.features)),
-            tick / rate,
-            elapsed,
-        )
-        if (self._anchor.place, self._anchor.yaw) == (before.place, before.yaw):
-            return features
-        return self._features(
-            *self._anchor.to_reference_world(position, velocity), now.position, body
-        )
+    def _look(self, state: StampedState, now: Told, body: RolloutModel) -> ReferenceSample:
+        """A state in the reference's world."""
+        position = self._model.position_of(state.position)
+        # A message's array cannot be written to, which is another type to compiled code.
+        seen = self.anchor.to_reference_world(position, state.velocity.copy())
+        return ReferenceSample(*seen, self._features(*seen, now.position, body))
 
-    def _balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Centre of mass (3,) in m and its velocity (3,) in m/s."""
-        first = self._centre
-        return features[first : first + 3], features[first + 3 : first + 6]
+    def _off(self, look: ReferenceSample, now: Told) -> FloatArray:
+        deviation = np.empty(len(look.features))
+        find_deviation(deviation, look.features, now.features, now.facing, self._centre)
+        return deviation
+
+    def _follow(self, tick: int, look: ReferenceSample, now: Told) -> bool:
+        """Have the reference's world give way to a state; whether it moved."""
+        rate, before = self._given.rate_hz, self.anchor
+        elapsed = 0.0 if self._offset is None else (tick - self._decided) / rate
+        planar = look.planar(self._centre), now.planar(self._centre)
+        self.anchor = before.advanced(*planar, tick / rate, elapsed)
+        return (self.anchor.place, self.anchor.yaw) != (before.place, before.yaw)
 
     def _features(
         self, position: FloatArray, velocity: FloatArray, target: FloatArray, body: RolloutModel
@@ -197,8 +201,8 @@ class PolicyPlanner:
     def _expect(self, expected: float, features: FloatArray) -> Outlook:
         """What it expects: a cost of 0 to 1 instead of a plan's."""
         cost = np.clip([1.0 - expected], 0.0, 1.0)
-        centre = self._anchor.to_world(self._balance(features)[0][np.newaxis])
-        return Outlook(np.zeros(1), centre, cost, cost, self._anchor)
+        centre = self.anchor.to_world(features[np.newaxis, self._centre : self._centre + 3])
+        return Outlook(np.zeros(1), centre, cost, cost, self.anchor)
 
 
 def _copy_of(made_of: tuple[Character, Policy, PlannerParameters], state: Any) -> object:
@@ -207,7 +211,8 @@ def _copy_of(made_of: tuple[Character, Policy, PlannerParameters], state: Any) -
 
     character, _, given = made_of
     copy = PolicyPlanner(*made_of, make_commands_in_flight(character, given))
-    copy._offset, copy._decided, copy._anchor, copy.outlook, sent = state
+    copy._offset, copy._decided, looked, sent = state
+    copy.anchor, copy.outlook, copy.last_deviation = looked
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)
     return copy

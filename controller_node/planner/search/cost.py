@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
+from controller_node.planner.compiled.features import STEP_TIME
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
-_STEP_TIME = 0.2  # s: feet go ahead of a pushed centre of mass by this times its velocity
 _STEP = 5.0  # 1/m, the weight of a foot that steps to there
 _LOOSE_CENTRE = 0.4  # share of the centre of mass's horizontal weight while the place gives way
 
@@ -25,31 +25,30 @@ class ResidualModel:
     def __init__(
         self, character: Character, model: ContactModel, settings: PlannerSettings
     ) -> None:
-        joints, weights = len(settings.sigma), settings.parameters.weights
+        layout, weights = model.feature_layout, settings.parameters.weights
         is_foot = [character.links[index].name in character.feet for index in model.end_effectors]
         parts = [
-            (weights.root_rotation, 3),
-            (weights.joints, joints),
-            (weights.root_spin, 3),
-            (weights.joint_rates, joints),
-            (weights.centre_of_mass, 3),
-            (weights.centre_of_mass_velocity, 3),
-            (weights.angular_momentum, 3),
-            *((weights.feet if foot else weights.hands, 3) for foot in is_foot),
+            weights.root_rotation,
+            weights.joints,
+            weights.root_spin,
+            weights.joint_rates,
+            weights.centre_of_mass,
+            weights.centre_of_mass_velocity,
+            weights.angular_momentum,
+            *(weights.feet if foot else weights.hands for foot in is_foot),
         ]
         # the mean of the checks' squares counts
         self._share = share = 1.0 / math.sqrt(settings.checks)
-        self._weights = share * np.repeat(
-            [weight for weight, _ in parts], [count for _, count in parts]
-        )
-        self._centre = 6 + 2 * joints
+        self._weights = share * np.repeat(parts, [*layout.sizes[:-1], *(3 for _ in is_foot)])
+        self.centre = layout.centre
+        """Where the centre of mass begins among features."""
         self.feet, self.hands = (
-            [self._centre + 9 + 3 * i for i, foot in enumerate(is_foot) if foot is wanted]
+            [layout.first_end + 3 * i for i, foot in enumerate(is_foot) if foot is wanted]
             for wanted in (True, False)
         )
         """Where feet and hands begin among features."""
         self._loose_weights = self._weights.copy()
-        self._loose_weights[self._centre : self._centre + 2] *= _LOOSE_CENTRE
+        self._loose_weights[self.centre : self.centre + 2] *= _LOOSE_CENTRE
         for foot in self.feet:
             self._loose_weights[foot : foot + 2] = share * _STEP
 
@@ -65,7 +64,7 @@ class ResidualModel:
 
     def balance(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Centres of mass (..., 3) in m, their velocities (..., 3) in m/s of features (..., f)."""
-        first = self._centre
+        first = self.centre
         return features[..., first : first + 3], features[..., first + 3 : first + 6]
 
     def residuals(self, deviations: FloatArray, *, perturbed: bool) -> FloatArray:
@@ -74,10 +73,10 @@ class ResidualModel:
             residuals: FloatArray = deviations * self._weights
             return residuals
         loose = deviations.copy()
-        centre = deviations[..., self._centre : self._centre + 3]
-        velocity = deviations[..., self._centre + 3 : self._centre + 6]
+        centre = deviations[..., self.centre : self.centre + 3]
+        velocity = deviations[..., self.centre + 3 : self.centre + 6]
         for foot in self.feet:
-            loose[..., foot : foot + 2] -= centre[..., :2] + _STEP_TIME * velocity[..., :2]
+            loose[..., foot : foot + 2] -= centre[..., :2] + STEP_TIME * velocity[..., :2]
         for hand in self.hands:
             loose[..., hand : hand + 3] -= centre
         loose *= self._loose_weights

@@ -86,11 +86,6 @@ class PlanSearch:
         found = improve(problem, place, samples, None)
         improve(problem, found.place, samples, found.sensitivities)
 
-    def cost(self, features: FloatArray, wanted: FloatArray) -> float:
-        """What features (f,) cost where others are wanted, without giving way."""
-        residuals = self._residual_model.residuals(features - wanted, perturbed=False)
-        return self._settings.checks * float(fixed_order.dot(residuals, residuals))
-
     def cost_ahead(self, start: Start, plan: Plan | None) -> float:
         """What going on with a plan will cost, on average; infinite if it leads to nothing."""
         problem = self._problem(start)

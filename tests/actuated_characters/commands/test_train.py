@@ -1,6 +1,7 @@
 """The command `train`: from options to a file that `run` plays."""
 
 import json
+import signal
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -93,6 +94,8 @@ def _options(arguments: Sequence[str]) -> object:
         (["--set", "controller_node.planner:=none"], "controller_node.planner:=none"),
         (["--set", "controller_node.policy:=x.npz"], "controller_node.policy:=x.npz"),
         (["--set", "controller_node.reference:=hold"], "reference"),
+        (["--set", "controller_node.behaviour:=reactive"], "has the behaviour tracking"),
+        (["--set", "controller_node.plan.friction:=0.5"], "it takes plan.weight., plan.gives_way"),
         (["--set", "controller_node.law:=pd"], "stable_pd"),
         (["--set", "controller_node.wieght:=1"], "wieght"),
         (["--set", "sim_node.rate:=120"], "sim_node"),
@@ -135,8 +138,10 @@ def test_it_overwrites_and_goes_on(
     assert "128 decisions" in capsys.readouterr().out
 
 
-def interrupted_at(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
-    """Have Ctrl-C come in the midst of a trace."""
+def interrupted_at(
+    monkeypatch: pytest.MonkeyPatch, count: int, number: int = signal.SIGINT
+) -> None:
+    """Have a signal come in the midst of a trace."""
     go_on, calls = Training.go_on, []
 
     def interrupted(self: Training) -> Progress:
@@ -144,7 +149,7 @@ def interrupted_at(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
         progress = go_on(self)
         if len(calls) == count:
             self._learner.policy.bias_3[:] = np.nan  # whatever is half done
-            raise Interrupted
+            raise Interrupted(number)
         return progress
 
     monkeypatch.setattr(Training, "go_on", interrupted)
@@ -165,6 +170,26 @@ def test_an_interruption_keeps_the_best(
     said = capsys.readouterr()
     assert "interrupted; the best so far is in walk.npz" in said.err
     assert "play it:" in said.out
+
+
+def test_who_ends_it_for_good_has_the_best_without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    make_small(monkeypatch, _LOOKS=10_000)
+    interrupted_at(monkeypatch, 3, signal.SIGTERM)
+
+    with pytest.raises(Interrupted):  # the command itself says so
+        main(["train", "--minutes", "10", "--output", "walk.npz"])
+
+    policy = read_policy("walk.npz", HUMANOID)
+    assert np.isfinite(policy.network.bias_3).all()
+    assert policy.about["figures"] == {}
+
+
+def test_a_file_of_many_clips_is_named_by_the_first_ones() -> None:
+    clips = ("walk", "run", "a/jump.csv", "roll", "kick")
+
+    output = train._output(_options(["train"]), clips)
+
+    assert output == Path("policies/humanoid-walk-run-jump-and-2-more.npz")
 
 
 def test_a_second_interruption_leaves_out_the_runs(

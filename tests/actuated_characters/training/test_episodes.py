@@ -36,18 +36,16 @@ class Stage:
     """One world in which episodes of the walk begin at its first row, undisturbed."""
 
     def __init__(self) -> None:
-        self.worlds = TrainingWorlds(
-            HUMANOID, JOB.settings, JOB.gains, threads=1, rng=np.random.default_rng(3)
-        )
+        self.worlds = TrainingWorlds(HUMANOID, JOB.settings, JOB.gains, threads=1)
         self.table, _ = make_table(self.worlds.model, self.worlds.body, JOB.references, RATE)
         rows = np.arange(RATE, dtype=np.intp)
-        self.scales = make_scales(self.table, [rows])
+        self.scales = make_scales(self.table, [rows], self.worlds.model.feature_layout)
         self.begin(self.table)
 
     def begin(self, table: Table, row: int = 0) -> None:
         """Begin an episode at a row, in the state of the reference."""
         starts = [np.array([row], dtype=np.intp)]
-        self.worlds.begin(table, starts, self.scales, 1)
+        self.worlds.begin(table, starts, self.scales, 1, np.random.default_rng(3))
         (episode,) = self.worlds._episodes
         self.episode = episode._replace(strength=1.0)
         self.worlds._episodes = [self.episode]
@@ -197,7 +195,8 @@ def test_training_and_product_see_the_same_and_give_way_alike(
     rules, network = stage.worlds.rules, stage.network(7)
     value = Network(*network[:4], network.weights_3[:, :1].copy(), network.bias_3[:1].copy())
     about = {"hold": rules.hold, "rate": RATE, "largest": rules.largest}
-    policy = Policy(about, network, value, stage.scales, stage.table.ahead, rules.unit)
+    gains = JOB.gains.stiffness, JOB.gains.damping
+    policy = Policy(about, network, value, stage.scales, stage.table.ahead, rules.unit, *gains)
     player = PolicyPlanner(HUMANOID, policy, JOB.settings.parameters)
     monkeypatch.setattr(product, "decide", note)  # it has decided once, to be compiled
     (reference,) = JOB.references
@@ -208,17 +207,15 @@ def test_training_and_product_see_the_same_and_give_way_alike(
         tick, model = number * rules.hold, stage.worlds.model
         assert stage.episode.counts.tolist() == [tick, number]
         state = StampedState(CLOCK.stamp_ns(tick), model.message_position(position), velocity, None)
-        offset = player.offset(
-            tick, state, JOB.gains, lambda tick: reference.reference.sample(tick / RATE)
-        )
+        offset = player.offset(tick, state, JOB.gains, reference.reference.desired_at)
         if number == 3:  # 60 N s
             stage.episode.push[:] = 200.0, 400.0, round(0.134 * RATE)
         before = stage.anchor()
         if number:
             np.testing.assert_allclose(
-                (player._anchor.place, player._anchor.yaw), (before.place, before.yaw), atol=1e-6
+                (player.anchor.place, player.anchor.yaw), (before.place, before.yaw), atol=1e-6
             )
-            assert player._anchor.is_perturbed(tick / RATE) == before.is_perturbed(tick / RATE)
+            assert player.anchor.is_perturbed(tick / RATE) == before.is_perturbed(tick / RATE)
         trace = stage.go_on(1, network)
         told.append(trace.observations[0])
         answer = rules.unit * np.clip(trace.actions[0], -rules.largest, rules.largest)

@@ -1,6 +1,7 @@
 """A policy's file: what is written is read, and whatever is wrong with it is one clear line."""
 
 import json
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,10 @@ WRONG: Mapping[str, tuple[Callable[[Content], object], str]] = {
     "backwards": (said(rate=-240), "'hold', 'rate' and 'largest' in 'about' must be above 0"),
     "no largest": (said(largest=float("nan")), "'largest' in 'about' must be above 0, and finite"),
     "no bound": (said(largest=float("inf")), "'largest' in 'about' must be above 0, and finite"),
+    "no mass": (said(mass=0), "'mass' in 'about' must be above 0"),
+    "upwards": (said(gravity=-9.81), "'gravity' at least 0"),
+    "no gains": (lambda content: content.pop("damping"), "it has no 'damping'"),
+    "too few gains": (with_array("stiffness", lambda array: array[1:]), "(its 'stiffness')"),
     "NaN": (with_array("policy.weights_2", poked(np.nan)), "'policy.weights_2' has entries that"),
     "too large": (
         with_array("policy.bias_1", lambda array: array.astype(float) + 1e300),
@@ -203,6 +208,17 @@ def test_what_is_wrong_in_a_file_is_one_line_that_names_it(
 
     assert error.startswith(str(path))
     assert reason in error
+
+
+def test_an_archive_that_is_far_too_large_is_not_unpacked(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "large.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("about.npy", bytes(200_000_000))
+    monkeypatch.setattr(np, "load", pytest.fail)
+
+    assert "it has an array of 200,000,000 bytes; 80,000,000 is the most" in error_of(path)
 
 
 OTHER_FILES: Mapping[str, Callable[[bytes], bytes]] = {
