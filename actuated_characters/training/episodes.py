@@ -17,7 +17,7 @@ from actuated_characters.training.episode_types import (
 )
 from actuated_characters.training.rewards import cost_of, is_lost, reward_of
 from controller_node.planner.compiled import rollout
-from controller_node.planner.compiled.anchoring import advance_anchor
+from controller_node.planner.compiled.anchoring import SOON, advance_anchor
 from controller_node.planner.compiled.law import Joints
 from controller_node.planner.compiled.network import Network, evaluate
 from controller_node.planner.compiled.observation import find_deviation, observe
@@ -228,6 +228,7 @@ def _move_reference(
     """
     row, anchor, engine = episode.counts[0], episode.anchor, world.engine
     c, wanted = rules.scales.centre, table.features[row]
+    soon = table.features[min(row + round(SOON / rules.period), table.ends[row])]
     root, wanted_root = quaternion(engine.position, 3), quaternion(table.positions[row], 3)
     x, y, z, w = wanted_root
     spin, up = table.velocities[row, 3:6], axes(wanted_root)[2]
@@ -241,6 +242,7 @@ def _move_reference(
         yaw_of(product(root, (-x, -y, -z, w))),
         complex(wanted[c], wanted[c + 1]),
         complex(wanted[c + 3], wanted[c + 4]),
+        complex(soon[c + 3], soon[c + 4]),
         up[0] * spin[0] + up[1] * spin[1] + up[2] * spin[2],
         episode.counts[1] * rules.hold * rules.period,
         rules.hold * rules.period,

@@ -62,13 +62,19 @@ class Anchor:
         return placed
 
     def advanced(
-        self, state: PlanarState, wanted: PlanarState, time: float, elapsed: float
+        self,
+        state: PlanarState,
+        wanted: PlanarState,
+        soon: PlanarState,
+        time: float,
+        elapsed: float,
     ) -> "Anchor":
-        """Where it is next, after a look at a state and at the reference, both in the latter's.
+        """Where it is next, after a look at a state and at the reference, all in the latter's.
 
         Args:
             state: The character.
             wanted: The reference.
+            soon: The reference `SOON` s later.
             time: s since the episode began.
             elapsed: s since the last look.
         """
@@ -83,6 +89,7 @@ class Anchor:
                 _heading(state.root, wanted.root),
                 wanted.centre,
                 wanted.velocity,
+                soon.velocity,
                 wanted.turn,
                 time,
                 elapsed,

@@ -21,6 +21,7 @@ from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.commands_in_flight import CommandsInFlight
+from controller_node.planner.compiled.anchoring import SOON
 from controller_node.planner.compiled.rollout import RolloutModel
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.outlook import Outlook
@@ -97,6 +98,7 @@ class PredictivePlanner:
         self._episode = 0
         self._plan: Plan | None = None
         self._coming: PendingPlan | None = None
+        self._guess: FloatArray | None = None  # offsets (n - 6,) of the first plan
         self.anchor = Anchor()
         """Where the reference's world is, for the next plan."""
         self._compile(character)
@@ -159,6 +161,7 @@ class PredictivePlanner:
     def rest(self) -> None:
         """Forget the plan, and where the reference had given way to: nothing is tracked."""
         self._plan, self._coming, self.anchor = None, None, Anchor()
+        self._guess = None
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -182,6 +185,15 @@ class PredictivePlanner:
             self._coming = self._start_search(tick, acts, state, gains, desired_at)
             self._take(tick)
         return np.concatenate((np.zeros(6), self._plan.offsets.at(tick)))
+
+    def take_over(self, anchor: Anchor, offset: FloatArray) -> None:
+        """Begin at the next state where another planner ends.
+
+        Its reference's world is where the anchor says, and the first plan is sought around its
+        offset (n,), as if that went on.
+        """
+        self.rest()
+        self.anchor, self._guess = anchor, offset[6:]
 
     def cost(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -266,7 +278,9 @@ class PredictivePlanner:
         """A plan that acts from a later tick on, from the state to which this one will lead."""
         body = self._model.body(gains)
         target = self._reference.target(tick, desired_at, body)
-        position, velocity = self._observe(tick, state, body, target)
+        later = round(SOON * self._rate_hz)
+        soon = self._reference.target(tick + later, desired_at, body)
+        position, velocity = self._observe(tick, state, body, target, soon)
         if self._plan is not None and acts > tick:
             offsets = self._plan.offsets
             between = self._reference.between(tick, acts, offsets.first_knot, desired_at, body)
@@ -276,13 +290,18 @@ class PredictivePlanner:
         desired = self._reference.ahead(acts, desired_at, body)
         perturbed = self.anchor.is_perturbed(tick / self._rate_hz)
         start = Start(tick, position, velocity, desired, body, self.anchor, perturbed)
-        seed = (self._seed, self._episode)
+        seed, guess, self._guess = (self._seed, self._episode), self._guess, None
         return PendingPlan(
-            tick, acts, self._thread.submit(self._search.find, start, self._plan, seed)
+            tick, acts, self._thread.submit(self._search.find, start, self._plan, seed, guess)
         )
 
     def _observe(
-        self, tick: int, state: StampedState, body: RolloutModel, target: ReferenceSample
+        self,
+        tick: int,
+        state: StampedState,
+        body: RolloutModel,
+        target: ReferenceSample,
+        soon: ReferenceSample,
     ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
         position = self._model.position_of(state.position)
@@ -297,6 +316,7 @@ class PredictivePlanner:
         self.anchor = self.anchor.advanced(
             look.planar(centre),
             target.planar(centre),
+            soon.planar(centre),
             tick / self._rate_hz,
             since_plan / self._rate_hz,
         )

@@ -99,13 +99,13 @@ class HybridPlanner:
             assert deviation is not None
             if not (is_due and self._is_hard(tick, deviation)):
                 return offset
-            self._hand_to_plans()
+            self._hand_to_plans(offset)
         return self._predictive.offset(*given)
 
     def _is_hard(self, tick: int, deviation: FloatArray) -> bool:
-        """Whether states have cost too much lately, after another one."""
+        """Whether states have cost too much lately, after another one, or it is pushed off."""
         self._look(tick, deviation, _GROWS_IN)
-        return self._cost > _TOO_MUCH
+        return self._cost > _TOO_MUCH or self._is_perturbed(tick)
 
     def _is_calm(self, tick: int, deviation: FloatArray) -> bool:
         """Whether states have cost little for a while, after another one."""
@@ -126,9 +126,8 @@ class HybridPlanner:
     def _is_perturbed(self, tick: int) -> bool:
         return self._policy.anchor.is_perturbed(tick / self._rate_hz)
 
-    def _hand_to_plans(self) -> None:
-        self._predictive.rest()
-        self._predictive.anchor = self._policy.anchor
+    def _hand_to_plans(self, offset: FloatArray) -> None:
+        self._predictive.take_over(self._policy.anchor, offset)
         self.plans, self._calm_since = True, None
 
     def _hand_to_policy(self) -> None:

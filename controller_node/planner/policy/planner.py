@@ -14,6 +14,7 @@ import numpy as np
 from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt
+from controller_node.planner.compiled.anchoring import SOON
 from controller_node.planner.compiled.observation import (
     decide,
     find_deviation,
@@ -63,6 +64,7 @@ class PolicyPlanner:
         self._centre = policy.scales.centre
         self._gains: GainArrays | None = None
         self._told: dict[int, Told] = {}
+        self._later = round(SOON * given.rate_hz)
         self._compile(character)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -146,7 +148,8 @@ class PolicyPlanner:
         for known in [known for known in self._told if known < tick]:
             del self._told[known]
         now, look = frames[0], self._look(state, frames[0], body)
-        if self._given.gives_way and self._follow(tick, look, now):
+        soon = self._tell(tick + self._later, desired_at, body)
+        if self._given.gives_way and self._follow(tick, look, now, soon):
             look = self._look(state, now, body)
         self.last_deviation = deviation = self._off(look, now)
         told = np.array([each.frame for each in frames])
@@ -171,12 +174,12 @@ class PolicyPlanner:
         find_deviation(deviation, look.features, now.features, now.facing, self._centre)
         return deviation
 
-    def _follow(self, tick: int, look: ReferenceSample, now: Told) -> bool:
+    def _follow(self, tick: int, look: ReferenceSample, now: Told, soon: Told) -> bool:
         """Have the reference's world give way to a state; whether it moved."""
         rate, before = self._given.rate_hz, self.anchor
         elapsed = 0.0 if self._offset is None else (tick - self._decided) / rate
-        planar = look.planar(self._centre), now.planar(self._centre)
-        self.anchor = before.advanced(*planar, tick / rate, elapsed)
+        seen, wanted, later = (each.planar(self._centre) for each in (look, now, soon))
+        self.anchor = before.advanced(seen, wanted, later, tick / rate, elapsed)
         return (self.anchor.place, self.anchor.yaw) != (before.place, before.yaw)
 
     def _features(

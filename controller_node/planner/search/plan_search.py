@@ -53,9 +53,16 @@ class PlanSearch:
         self._settings = settings
         self._unit = settings.parameters.noise * settings.sigma  # (n - 6,) rad or m: the unit of x
 
-    def find(self, start: Start, old: Plan | None, seed: tuple[int, int]) -> Plan:
+    def find(
+        self,
+        start: Start,
+        old: Plan | None,
+        seed: tuple[int, int],
+        guess: FloatArray | None = None,
+    ) -> Plan:
         """A plan from a state, sought around what is left of an old one.
 
+        Without an old one it is sought around a guess: offsets (n - 6,) that are held, or zero.
         `seed` is of its draws: the planner's and the episode.
         """
         settings, tick = self._settings, start.desired.rollout.first_tick
@@ -63,6 +70,8 @@ class PlanSearch:
         count = self._knot_count(tick)
         areas = areas_of(tick, count, settings)
         place, sensitivities = self._left(old, tick), None
+        if old is None and guess is not None:
+            place = np.tile(guess / self._unit, count)
         rounds, enough = _FIRST_ROUNDS, 0.0
         if old is not None:
             sensitivities = old.faded(tick, areas, settings)

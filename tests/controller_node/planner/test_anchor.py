@@ -47,7 +47,7 @@ def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
     anchor = Anchor()
     for tick in range(200):
         state = pushed(0.2 + 0.1j, velocity=0.4j)
-        anchor = anchor.advanced(state, WALKING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(state, WALKING, WALKING, tick * PERIOD, PERIOD)
     position, velocity = random_state(0)
 
     seen, moving = anchor.to_reference_world(position, velocity)
@@ -55,6 +55,25 @@ def test_undisturbed_it_stays_where_it_is_to_the_last_bit() -> None:
     assert (anchor.place, anchor.yaw) == (0j, 0.0)
     assert seen is position
     assert moving is velocity
+
+
+@pytest.mark.parametrize(
+    ("now", "soon", "is_perturbed"),
+    [
+        (1.2, 1.2, False),
+        (2.2, 1.2, False),  # one frame of a capture is faster
+        (1.2, 2.2, False),  # it begins to go faster
+        (2.2, 2.2, True),
+    ],
+)
+def test_who_is_as_fast_as_the_reference_will_be_is_not_perturbed(
+    now: float, soon: float, is_perturbed: bool
+) -> None:
+    wanted, later = (replace(WALKING, velocity=complex(speed)) for speed in (now, soon))
+
+    anchor = Anchor().advanced(WALKING, wanted, later, 2.0, PERIOD)
+
+    assert anchor.is_perturbed(2.1) == is_perturbed
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -85,7 +104,7 @@ def test_pushed_away_it_follows_and_turns() -> None:
     places, yaws = [0j], [0.0]
     for tick in range(200):
         state = replace(seen_from(anchor, where, heading), velocity=WALKING.velocity)
-        anchor = anchor.advanced(state, WALKING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(state, WALKING, WALKING, tick * PERIOD, PERIOD)
         places.append(anchor.place)
         yaws.append(anchor.yaw)
 
@@ -99,12 +118,12 @@ def test_pushed_away_it_follows_and_turns() -> None:
 def test_as_the_reference_comes_to_stand_its_world_follows_for_a_second_and_stays() -> None:
     # Arrange: too near for a push
     where, heading, wanted = 2.2 + 1.1j, 0.3, replace(STANDING, centre=2 + 1j)
-    anchor = Anchor().advanced(WALKING, WALKING, 0.0, PERIOD)
+    anchor = Anchor().advanced(WALKING, WALKING, WALKING, 0.0, PERIOD)
     before, settled = abs(where - wanted.centre), None
     for tick in range(1, 100):
         # Act
         state = seen_from(anchor, where, heading)
-        anchor = anchor.advanced(state, wanted, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(state, wanted, wanted, tick * PERIOD, PERIOD)
 
         # Assert
         assert not anchor.is_perturbed(tick * PERIOD)
@@ -118,7 +137,7 @@ def test_as_the_reference_comes_to_stand_its_world_follows_for_a_second_and_stay
 
     # and it returns once the reference goes on
     for tick in range(100, 500):
-        anchor = anchor.advanced(WALKING, WALKING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(WALKING, WALKING, WALKING, tick * PERIOD, PERIOD)
     assert abs(anchor.place) < 0.01
     assert abs(anchor.yaw) < 0.01
 
@@ -135,9 +154,11 @@ def test_as_the_reference_comes_to_stand_its_world_follows_for_a_second_and_stay
 def test_what_moves_is_not_at_rest_whatever_the_character_does(
     wanted: PlanarState, follows: bool
 ) -> None:
-    anchor = Anchor().advanced(WALKING, WALKING, 0.0, PERIOD)
+    anchor = Anchor().advanced(WALKING, WALKING, WALKING, 0.0, PERIOD)
 
-    anchor = anchor.advanced(replace(WALKING, centre=0.1 + 0j, velocity=0.5), wanted, 0.5, PERIOD)
+    anchor = anchor.advanced(
+        replace(WALKING, centre=0.1 + 0j, velocity=0.5), wanted, wanted, 0.5, PERIOD
+    )
 
     assert not anchor.is_perturbed(0.5)
     assert abs(anchor.place) == pytest.approx(0.1 * PERIOD / 0.3 if follows else 0.0)
@@ -147,7 +168,7 @@ def test_pushed_while_the_reference_stands_it_follows_and_does_not_return() -> N
     anchor, where = Anchor(), 0.6j
     for tick in range(200):
         state = seen_from(anchor, where, 0.0)
-        anchor = anchor.advanced(state, STANDING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(state, STANDING, STANDING, tick * PERIOD, PERIOD)
 
     assert abs(where - anchor.place) < 0.02
     assert not anchor.is_perturbed(200 * PERIOD)
@@ -161,7 +182,7 @@ def test_the_way_back_leads_to_the_clips_own_place_and_heading() -> None:
         at_ease = replace(WALKING, centre=walking)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         before = turn * walking + anchor.place
-        anchor = anchor.advanced(at_ease, at_ease, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(at_ease, at_ease, at_ease, tick * PERIOD, PERIOD)
         turn = complex(math.cos(anchor.yaw), math.sin(anchor.yaw))
         away.append(turn * walking + anchor.place - walking)
         assert abs(away[-1] + walking - before) <= 0.15 * PERIOD + 1e-12
@@ -194,7 +215,7 @@ def test_what_flips_over_turns_the_reference_by_how_far_it_is_off_about_z(lean: 
     state = PlanarState(0.4 + 0j, 0j, rotations.multiply(off, wanted))
 
     # Act
-    anchor = Anchor().advanced(state, replace(WALKING, root=wanted), 0.0, PERIOD)
+    anchor = Anchor().advanced(state, replace(WALKING, root=wanted), WALKING, 0.0, PERIOD)
 
     # Assert
     assert anchor.yaw == pytest.approx(0.2 * PERIOD / 1.0, rel=0.02)
@@ -205,7 +226,7 @@ def test_it_returns_while_it_gives_way_too() -> None:
     anchor = Anchor(0.5 + 0j, 0.4)
     fast = pushed(0j, velocity=0.9 + 0j)  # where the reference is, but faster
     for tick in range(100):
-        anchor = anchor.advanced(fast, WALKING, tick * PERIOD, PERIOD)
+        anchor = anchor.advanced(fast, WALKING, WALKING, tick * PERIOD, PERIOD)
 
     assert anchor.is_perturbed(100 * PERIOD)
     assert abs(anchor.place) < 0.15

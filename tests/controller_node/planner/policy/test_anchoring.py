@@ -29,7 +29,8 @@ def arguments(seed: int) -> tuple[complex | float, ...]:
     off, turn = float(rng.normal()), float(rng.choice((0.0, 0.01, 0.5)))
     elapsed = float(rng.choice((0.0, 1 / 240, 1 / 30, 0.5, 4.0)))
     anchor = (place, yaw, calm_from, settled_from)
-    return *anchor, centre, velocity, off, wanted, wanted_velocity, turn, time, elapsed
+    soon = wanted_velocity + pair(rng.choice((0.0, 0.5)))
+    return *anchor, centre, velocity, off, wanted, wanted_velocity, soon, turn, time, elapsed
 
 
 def bits(results: tuple[complex | float, ...]) -> bytes:
@@ -51,12 +52,13 @@ def test_compiled_it_has_the_bits_of_plain_python() -> None:
 def test_an_anchor_advances_by_it(seed: int) -> None:
     given = arguments(seed)
     place, yaw, calm_from, settled_from, centre, velocity, off, wanted, wanted_velocity = given[:9]
-    turn, time, elapsed = given[9:]
+    velocity_soon, turn, time, elapsed = given[9:]
     state = PlanarState(centre, velocity, rotations.about_z(float(np.real(off))))  # type: ignore[arg-type]
     target = PlanarState(wanted, wanted_velocity, rotations.about_z(0.0), turn)  # type: ignore[arg-type]
+    soon = PlanarState(0j, velocity_soon, rotations.about_z(0.0))  # type: ignore[arg-type]
 
     anchor = Anchor(place, yaw, calm_from, settled_from)  # type: ignore[arg-type]
-    found = anchor.advanced(state, target, time, elapsed)  # type: ignore[arg-type]
+    found = anchor.advanced(state, target, soon, time, elapsed)  # type: ignore[arg-type]
 
     expected = FAST(*given)  # type: ignore[arg-type]
     assert math.isclose(found.yaw, expected[1], abs_tol=1e-12)
