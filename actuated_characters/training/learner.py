@@ -23,6 +23,7 @@ _VALUE_RATE = 1e-3
 _VALUE_WEIGHT = 4.0
 _RATES = (2e-5, 1e-3)  # between which the policy's rate is led by how much a policy changes
 _TOO_FAR = 3.0  # times the divergence that is aimed at, at which a policy learns no more of a trace
+_LEAST_CALM = 1e-3
 _OVER_WEIGHT = np.float32(0.1)  # of means beyond the largest action
 
 
@@ -167,6 +168,10 @@ class Learner:
             centred.astype(np.float32).ravel(),
             ((advantages + values) / whole).astype(np.float32).ravel(),
         )
+
+    def least_expected(self, trace: Trace) -> float:
+        """What is expected in the states of a trace (worlds, decisions) but for a twentieth."""
+        return max(float(np.quantile(self._values(trace.observations), 0.05)), _LEAST_CALM)
 
     def _values(self, observations: SingleArray) -> FloatArray:
         rows = observations.reshape(-1, observations.shape[-1])

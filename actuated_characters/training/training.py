@@ -70,8 +70,8 @@ class Progress:
     is_better: bool  # whether there is a better policy than before
 
 
-Kept: TypeAlias = tuple[Network, Network, Mapping[str, object]]
-"""Policy, value, and what they were trained with."""
+Kept: TypeAlias = tuple[Network, Network, Mapping[str, object], float]
+"""Policy, value, what they were trained with, and what is expected while it is calm."""
 
 
 def decisions_of(policy: Policy) -> int:
@@ -188,7 +188,7 @@ class Training:
         """The best policy so far; there is one from the first look on."""
         assert self._kept is not None
         job, rules = self._job, self._worlds.rules
-        network, value, trained = self._kept
+        network, value, trained, calm = self._kept
         about = {
             "character": job.character.name,
             "dofs": list(job.character.layout.dof_names),
@@ -197,6 +197,7 @@ class Training:
             "hold": rules.hold,
             "mass": round(job.character.mass, 6),
             "gravity": job.settings.parameters.gravity,
+            "calm": round(calm, 4),
             "largest": rules.largest,
             "trained": trained,
             "figures": figures,
@@ -225,6 +226,8 @@ class Training:
         self._judges.begin(self._table, self._starts, self._scales, _LOOK_WORLDS, draws)
         decisions = round(_LOOK_S / self._decision_s)
         trace, _ = self._judges.run(self._learner.policy, decisions, 0.0, most_push)
+        if most_push == 0.0:
+            self._calm = self._learner.least_expected(trace)
         falls = float((trace.ends == FELL).mean()) / self._decision_s
         return float(trace.rewards.mean()) - _FALL_COSTS * falls
 
@@ -240,7 +243,7 @@ class Training:
             Network(*(each.copy() for each in network))
             for network in (learner.policy, learner.value)
         )
-        return policy, value, trained
+        return policy, value, trained, self._calm
 
     def _progress(self, trace: Trace, push: float, is_better: bool) -> Progress:
         ended = trace.lengths[(trace.ends == FELL) | (trace.ends == CUT)]

@@ -52,6 +52,7 @@ def random_policy(
         "hold": hold,
         "mass": character.mass,
         "gravity": 9.81,
+        "calm": 0.5,
         "largest": largest,
         "trained": {},
         "figures": {},

@@ -1,9 +1,9 @@
 """A trained policy's file: a network, what it is told, what it answers, and what it was trained on.
 
 An archive of numpy (`.npz`) without pickled objects. `about` is a JSON text: format, character,
-its mass, clips, rate, ticks of a decision, largest action, gravity, what it was trained with and
-the figures that it was accepted with; the arrays have the names of the fields of `Network`,
-`ObservationScales` and `Policy`.
+its mass, clips, rate, ticks of a decision, largest action, gravity, what it expects while it is
+calm, what it was trained with and the figures that it was accepted with; the arrays have the names
+of the fields of `Network`, `ObservationScales` and `Policy`.
 """
 
 import io
@@ -39,6 +39,7 @@ _ABOUT: Mapping[str, tuple[type | tuple[type, ...], str]] = {
     "largest": ((int, float), "a number"),
     "mass": ((int, float), "a number"),
     "gravity": ((int, float), "a number"),
+    "calm": ((int, float), "a number"),
     "trained": (dict, "a mapping"),
     "figures": (dict, "a mapping"),
 }
@@ -69,6 +70,11 @@ class Policy:
     def rate_hz(self) -> int:
         """Ticks a second."""
         return int(self.about["rate"])
+
+    @property
+    def calm(self) -> float:
+        """What it expects at least while it is calm, but for a twentieth of its states."""
+        return float(self.about["calm"])
 
     @property
     def largest(self) -> float:
@@ -179,6 +185,8 @@ def _read_about(content: Mapping[str, Any]) -> Mapping[str, Any]:
         raise ValueError("'hold', 'rate' and 'largest' in 'about' must be above 0, and finite")
     if not 0.0 < about["mass"] < math.inf or not 0.0 <= about["gravity"] < math.inf:
         raise ValueError("'mass' in 'about' must be above 0, 'gravity' at least 0, both finite")
+    if not 0.0 < about["calm"] < math.inf:
+        raise ValueError("'calm' in 'about' must be above 0, and finite")
     return about
 
 

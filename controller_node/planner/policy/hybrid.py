@@ -1,8 +1,9 @@
-"""A policy while it is calm, and planning ahead while a state costs too much.
+"""A policy while it is calm, and planning ahead while it expects too little.
 
 A policy answers at once, but what it was not trained on makes it fall; planning ahead takes as long
-as the motion, or longer, and bears hard pushes. Both see the reference in the same place: who goes
-on takes over where it had given way to.
+as the motion, or longer, and bears hard pushes. What the policy itself expects of a state says
+first that it will not be able to bear a push. Both see the reference in the same place: who goes on
+takes over where it had given way to.
 """
 
 from collections.abc import Callable
@@ -22,10 +23,9 @@ from msgs_config.messages.state import StampedState
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
 
-_TOO_MUCH = 90.0  # cost from which on it plans; a walk's footfalls reach 60
-_CALM = 40.0  # cost below which the policy may go on
+_TOO_LITTLE = 0.7  # of what it expects while it is calm; from there on it plans
+_ENOUGH = 0.9  # of the same; above it the policy may go on
 _CALM_S = 0.4  # s for which it must have been so
-_GROWS_IN, _FADES_IN = 0.08, 0.15  # s, time constants of the mean of costs
 
 
 class HybridPlanner:
@@ -34,6 +34,7 @@ class HybridPlanner:
     def __init__(self, character: Character, policy: Policy, settings: PlannerSettings) -> None:
         """Build both models of the dynamics."""
         self._hold, self._rate_hz = policy.hold, settings.parameters.rate_hz
+        self._calm = policy.calm
         self._predictive = PredictivePlanner(character, settings)
         self._policy = PolicyPlanner(character, policy, settings.parameters)
         self.rest()
@@ -74,7 +75,6 @@ class HybridPlanner:
         self._policy.rest()
         self.plans = False
         """Whether it plans ahead, rather than have the policy answer."""
-        self._cost = 0.0  # mean of lately
         self._calm_since: int | None = None  # tick
         self._looked = -1  # the last tick of a look
 
@@ -89,39 +89,31 @@ class HybridPlanner:
         if tick < self._looked:
             self.rest()  # a state of before, which comes once more
         is_due = self._looked < 0 or tick // self._hold > self._looked // self._hold
+        if is_due:
+            self._looked = tick
         if self.plans:
             self._policy.anchor = self._predictive.anchor
-            if is_due and self._is_calm(tick, self._policy.deviation(*given)):
+            if is_due and self._is_calm(tick, self._policy.expect(*given)):
                 self._hand_to_policy()
         if not self.plans:
             offset = self._policy.offset(*given)
-            deviation = self._policy.last_deviation
-            assert deviation is not None
-            if not (is_due and self._is_hard(tick, deviation)):
+            if not (is_due and self._is_pushed(tick)):
                 return offset
             self._hand_to_plans(offset)
         return self._predictive.offset(*given)
 
-    def _is_hard(self, tick: int, deviation: FloatArray) -> bool:
-        """Whether states have cost too much lately, after another one, or it is pushed off."""
-        self._look(tick, deviation, _GROWS_IN)
-        return self._cost > _TOO_MUCH or self._is_perturbed(tick)
+    def _is_pushed(self, tick: int) -> bool:
+        """Whether the policy expects too little of its last decision's state."""
+        return self._policy.expected < _TOO_LITTLE * self._calm or self._is_perturbed(tick)
 
-    def _is_calm(self, tick: int, deviation: FloatArray) -> bool:
-        """Whether states have cost little for a while, after another one."""
-        self._look(tick, deviation, _FADES_IN)
-        if self._cost > _CALM or self._is_perturbed(tick):
+    def _is_calm(self, tick: int, expected: float) -> bool:
+        """Whether enough has been expected of states for a while, after another one."""
+        if expected < _ENOUGH * self._calm or self._is_perturbed(tick):
             self._calm_since = None
             return False
         if self._calm_since is None:
             self._calm_since = tick
         return tick - self._calm_since >= _CALM_S * self._rate_hz
-
-    def _look(self, tick: int, deviation: FloatArray, keeps: float) -> None:
-        cost = self._predictive.cost_of(deviation, perturbed=self._is_perturbed(tick))
-        share = min(self._hold / (keeps * self._rate_hz), 1.0)
-        self._cost += share * (cost - self._cost)
-        self._looked = tick
 
     def _is_perturbed(self, tick: int) -> bool:
         return self._policy.anchor.is_perturbed(tick / self._rate_hz)

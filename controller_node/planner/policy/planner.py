@@ -15,6 +15,7 @@ from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt
 from controller_node.planner.compiled.anchoring import SOON
+from controller_node.planner.compiled.network import evaluate
 from controller_node.planner.compiled.observation import (
     decide,
     find_deviation,
@@ -29,7 +30,7 @@ from controller_node.planner.policy.file import Policy
 from controller_node.planner.sampled_reference import ReferenceSample
 from controller_node.planner.settings import PlannerParameters
 from controller_node.references.base import ReferenceState
-from msgs_config.arrays import FloatArray
+from msgs_config.arrays import FloatArray, SingleArray
 from msgs_config.character.model import Character
 from msgs_config.messages.state import StampedState
 
@@ -70,7 +71,7 @@ class PolicyPlanner:
     def __reduce__(self) -> tuple[object, ...]:
         """For a copy, in this process or another: it goes on alike."""
         sent = None if self.in_flight is None else self.in_flight.sent()
-        looked = (self.anchor, self.outlook, self.last_deviation)
+        looked = (self.anchor, self.outlook, self.expected)
         state = (self._offset, self._decided, looked, sent)
         return _copy_of, (self._made_of, state)
 
@@ -102,8 +103,8 @@ class PolicyPlanner:
         self.anchor = Anchor()
         """Where the reference's world is."""
         self.outlook: Outlook | None = None
-        self.last_deviation: FloatArray | None = None
-        """What the last decision answered: see `deviation`."""
+        self.expected = 1.0
+        """What the last decision expected: see `expect`."""
 
     def offset(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
@@ -127,13 +128,19 @@ class PolicyPlanner:
         self._decide(0, StampedState(0, rest, nothing, None), gains, lambda _: still)
         self.begin_episode(0)
 
-    def deviation(
+    def expect(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
-    ) -> FloatArray:
-        """By how much a state is off the reference, where that has given way to: features (f,)."""
+    ) -> float:
+        """What it expects of a state, where the reference has given way to; it remembers nothing.
+
+        From 0 to about 1: the mean reward from there on.
+        """
         body = self._body_of(gains)
-        now = self._tell(tick, desired_at, body)
-        return self._off(self._look(state, now, body), now)
+        frames = self._frames(tick, desired_at, body)
+        observation = self._observation(self._look(state, frames[0], body), frames)
+        value = np.empty(1, np.float32)
+        evaluate(self._policy.value, observation, value)
+        return float(value[0])
 
     def _body_of(self, gains: GainArrays) -> RolloutModel:
         if gains is not self._gains:
@@ -144,23 +151,32 @@ class PolicyPlanner:
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         policy, body = self._policy, self._body_of(gains)
-        frames = [self._tell(tick + ahead, desired_at, body) for ahead in policy.ahead.tolist()]
-        for known in [known for known in self._told if known < tick]:
-            del self._told[known]
+        frames = self._frames(tick, desired_at, body)
         now, look = frames[0], self._look(state, frames[0], body)
         soon = self._tell(tick + self._later, desired_at, body)
         if self._given.gives_way and self._follow(tick, look, now, soon):
             look = self._look(state, now, body)
-        self.last_deviation = deviation = self._off(look, now)
-        told = np.array([each.frame for each in frames])
-        observation = np.empty(len(deviation) + told.size, np.float32)
-        observe(observation, deviation, told, now.facing, policy.scales)
+        observation = self._observation(look, frames)
         offset = np.zeros(len(state.velocity))
-        expected = decide(
+        self.expected = decide(
             offset[6:], policy.network, policy.value, observation, policy.unit, policy.largest
         )
-        self.outlook = self._expect(expected, look.features)
+        self.outlook = self._outlook(look.features)
         return offset
+
+    def _frames(self, tick: int, desired_at: DesiredAt, body: RolloutModel) -> list[Told]:
+        """The reference now and ahead; what is before is forgotten."""
+        for known in [known for known in self._told if known < tick]:
+            del self._told[known]
+        return [self._tell(tick + ahead, desired_at, body) for ahead in self._policy.ahead.tolist()]
+
+    def _observation(self, look: ReferenceSample, frames: list[Told]) -> SingleArray:
+        now, deviation = frames[0], np.empty(len(look.features))
+        find_deviation(deviation, look.features, now.features, now.facing, self._centre)
+        told = np.array([each.frame for each in frames])
+        observation = np.empty(len(deviation) + told.size, np.float32)
+        observe(observation, deviation, told, now.facing, self._policy.scales)
+        return observation
 
     def _look(self, state: StampedState, now: Told, body: RolloutModel) -> ReferenceSample:
         """A state in the reference's world."""
@@ -168,11 +184,6 @@ class PolicyPlanner:
         # A message's array cannot be written to, which is another type to compiled code.
         seen = self.anchor.to_reference_world(position, state.velocity.copy())
         return ReferenceSample(*seen, self._features(*seen, now.position, body))
-
-    def _off(self, look: ReferenceSample, now: Told) -> FloatArray:
-        deviation = np.empty(len(look.features))
-        find_deviation(deviation, look.features, now.features, now.facing, self._centre)
-        return deviation
 
     def _follow(self, tick: int, look: ReferenceSample, now: Told, soon: Told) -> bool:
         """Have the reference's world give way to a state; whether it moved."""
@@ -201,9 +212,9 @@ class PolicyPlanner:
             self._told[tick] = Told(position, state.velocity, features, frame, facing)
         return self._told[tick]
 
-    def _expect(self, expected: float, features: FloatArray) -> Outlook:
+    def _outlook(self, features: FloatArray) -> Outlook:
         """What it expects: a cost of 0 to 1 instead of a plan's."""
-        cost = np.clip([1.0 - expected], 0.0, 1.0)
+        cost = np.clip([1.0 - self.expected], 0.0, 1.0)
         centre = self.anchor.to_world(features[np.newaxis, self._centre : self._centre + 3])
         return Outlook(np.zeros(1), centre, cost, cost, self.anchor)
 
@@ -215,7 +226,7 @@ def _copy_of(made_of: tuple[Character, Policy, PlannerParameters], state: Any) -
     character, _, given = made_of
     copy = PolicyPlanner(*made_of, make_commands_in_flight(character, given))
     copy._offset, copy._decided, looked, sent = state
-    copy.anchor, copy.outlook, copy.last_deviation = looked
+    copy.anchor, copy.outlook, copy.expected = looked
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)
     return copy

@@ -176,6 +176,7 @@ def test_the_best_is_kept_rather_than_the_last(
         return SimpleNamespace(ends=ends, rewards=np.full((2, 6), next(scores))), None
 
     monkeypatch.setattr(training._judges, "run", run)
+    monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
     for number in range(3):
         training._learner.policy.bias_3[:] = number
         bests.append(training._look())
@@ -214,6 +215,7 @@ def test_a_policy_that_falls_is_worse_than_one_that_costs_a_little_more(
         return SimpleNamespace(ends=ends, rewards=np.full((2, 30), reward)), None
 
     monkeypatch.setattr(training._judges, "run", run)
+    monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
 
     assert [training._look(), training._look()] == [True, False]
 

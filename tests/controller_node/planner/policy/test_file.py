@@ -132,6 +132,7 @@ WRONG: Mapping[str, tuple[Callable[[Content], object], str]] = {
     "no bound": (said(largest=float("inf")), "'largest' in 'about' must be above 0, and finite"),
     "no mass": (said(mass=0), "'mass' in 'about' must be above 0"),
     "upwards": (said(gravity=-9.81), "'gravity' at least 0"),
+    "never calm": (said(calm=0.0), "'calm' in 'about' must be above 0"),
     "no gains": (lambda content: content.pop("damping"), "it has no 'damping'"),
     "too few gains": (with_array("stiffness", lambda array: array[1:]), "(its 'stiffness')"),
     "NaN": (with_array("policy.weights_2", poked(np.nan)), "'policy.weights_2' has entries that"),

@@ -114,7 +114,7 @@ def test_who_takes_over_sees_the_reference_where_it_had_given_way_to(
         elif before[0] and not planner.plans:
             anchors.append(before[2])
             assert _near(planner._policy.anchor, before[2])
-    assert len(anchors) == 2
+    assert len(anchors) >= 2
     assert abs(anchors[1].place) > 0.02
 
 
