@@ -20,7 +20,6 @@ from controller_node.controller_settings import ControllerSettings, LawSettings
 from controller_node.effort_series import read_effort_series
 from controller_node.planner import factory
 from controller_node.planner import settings as planner_settings
-from controller_node.planner.factory import make_planner
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.base import Reference
 from controller_node.references.factory import MOTION_PARAMETERS
@@ -202,7 +201,7 @@ def make_controller(character: Character, reference: Reference, values: Values) 
         gravity=shared.gravity,
         series=read_effort_series(character.layout, path) if path else None,
         behaviour=choose_behaviour(character, values),
-        planner=make_planner(character, values),
+        planner=factory.make_planner(character, values),
     )
 
 

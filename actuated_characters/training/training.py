@@ -214,24 +214,28 @@ class Training:
     def _look(self) -> bool:
         """Keep the policy if it is the best so far, in episodes as it would be used; if it is."""
         self._looked = self._done * _LOOKS // self._job.decisions
-        score = sum(map(self._score, sorted({0.0, _EXAM_PUSH * self._job.most_push})))
+        traces = [self._exam(push) for push in sorted({0.0, _EXAM_PUSH * self._job.most_push})]
+        score = sum(map(self._score, traces))
         is_better = score >= self._best
         if is_better:
-            self._best, self._kept = score, self._current()
+            calm = self._learner.least_expected(traces[0])
+            self._best, self._kept = score, self._current(calm)
         return is_better
 
-    def _score(self, most_push: float) -> float:
-        """Reward, less falls, in episodes that are the same each time but for what it does."""
+    def _exam(self, most_push: float) -> Trace:
+        """Episodes that are the same each time but for what the policy does."""
         draws = np.random.default_rng((self._job.seed, 2))
         self._judges.begin(self._table, self._starts, self._scales, _LOOK_WORLDS, draws)
         decisions = round(_LOOK_S / self._decision_s)
         trace, _ = self._judges.run(self._learner.policy, decisions, 0.0, most_push)
-        if most_push == 0.0:
-            self._calm = self._learner.least_expected(trace)
+        return trace
+
+    def _score(self, trace: Trace) -> float:
+        """Reward, less falls."""
         falls = float((trace.ends == FELL).mean()) / self._decision_s
         return float(trace.rewards.mean()) - _FALL_COSTS * falls
 
-    def _current(self) -> Kept:
+    def _current(self, calm: float) -> Kept:
         """Copies of policy and value, and what they were trained with."""
         learner, job = self._learner, self._job
         trained = {
@@ -243,7 +247,7 @@ class Training:
             Network(*(each.copy() for each in network))
             for network in (learner.policy, learner.value)
         )
-        return policy, value, trained, self._calm
+        return policy, value, trained, calm
 
     def _progress(self, trace: Trace, push: float, is_better: bool) -> Progress:
         ended = trace.lengths[(trace.ends == FELL) | (trace.ends == CUT)]

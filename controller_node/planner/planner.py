@@ -205,11 +205,7 @@ class PredictivePlanner:
         body, position = self._model.body(gains), self._model.position_of(state.position)
         features = self._rollouts.features_of(position, state.velocity.copy(), body)
         wanted = self._reference.target(tick, desired_at, body).features
-        return self.cost_of(features - wanted, perturbed=False)
-
-    def cost_of(self, deviation: FloatArray, *, perturbed: bool) -> float:
-        """What a deviation of features (f,) from the reference's costs."""
-        residuals = self._residual_model.residuals(deviation, perturbed=perturbed)
+        residuals = self._residual_model.residuals(features - wanted, perturbed=False)
         return self.settings.checks * float(fixed_order.dot(residuals, residuals))
 
     def cost_ahead(

@@ -125,7 +125,9 @@ class PolicyPlanner:
         still = ReferenceState(layout.configuration(rest), nothing, nothing)
         gains = GainArrays(nothing, nothing, nothing, character.effort_limits())
         self.rest()
-        self._decide(0, StampedState(0, rest, nothing, None), gains, lambda _: still)
+        given = 0, StampedState(0, rest, nothing, None), gains, lambda _: still
+        self._decide(*given)
+        self.expect(*given)
         self.begin_episode(0)
 
     def expect(
