@@ -24,9 +24,10 @@ class BulletBalls:
     def add(self, throw: ProjectileThrow) -> None:
         """Let a ball go: put it into the world with the position and velocity of the throw."""
         client = self._client
-        number = pybullet.createMultiBody(
-            throw.mass, self._shape(throw.radius), -1, throw.position, physicsClientId=client
-        )
+        with client.alone():
+            number = pybullet.createMultiBody(
+                throw.mass, self._shape(throw.radius), -1, throw.position, physicsClientId=client
+            )
         # One call a setting: a body silently loses some of those that share a call.
         settings = (
             {"linearDamping": 0.0, "angularDamping": 0.0},
@@ -71,17 +72,20 @@ class BulletBalls:
 
     def place(self, ball: int, centre: FloatArray | Sequence[float]) -> None:
         """Put the centre of a ball, by its place in the order, to a point (3,), m."""
-        pybullet.resetBasePositionAndOrientation(
-            self.numbers[ball], centre, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
-        )
+        with self._client.alone():
+            pybullet.resetBasePositionAndOrientation(
+                self.numbers[ball], centre, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+            )
 
     def set_motion(self, motion: FloatArray) -> None:
         """Give the balls a motion (m, 13), as `motion` returns it."""
-        for number, row in zip(self.numbers, motion, strict=True):
-            pybullet.resetBasePositionAndOrientation(
-                number, row[:3], row[3:7], physicsClientId=self._client
-            )
-            pybullet.resetBaseVelocity(number, row[7:10], row[10:], physicsClientId=self._client)
+        client = self._client
+        with client.alone():
+            for number, row in zip(self.numbers, motion, strict=True):
+                pybullet.resetBasePositionAndOrientation(
+                    number, row[:3], row[3:7], physicsClientId=client
+                )
+                pybullet.resetBaseVelocity(number, row[7:10], row[10:], physicsClientId=client)
 
     def motion(self) -> FloatArray:
         """Centre m, orientation xyzw, velocity m/s, angular velocity rad/s, world: (m, 13)."""

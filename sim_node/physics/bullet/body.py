@@ -137,17 +137,18 @@ class BulletBody:
     def set_state(self, position: FloatArray, velocity: FloatArray) -> None:
         """Put the character into a state given as `read` gives it."""
         self.forget_reading()
-        if self._floating:
-            self._place_base(position[:3], rotations.exp(position[3:6]))
-            self._set_base_velocity(velocity[:3], velocity[3:6])
-        for index, value, speed in self._engine_motion(position, velocity):
-            pybullet.resetJointStateMultiDof(
-                self._body,
-                index,
-                targetValue=value,
-                targetVelocity=speed,
-                physicsClientId=self._client,
-            )
+        with self._client.alone():
+            if self._floating:
+                self._place_base(position[:3], rotations.exp(position[3:6]))
+                self._set_base_velocity(velocity[:3], velocity[3:6])
+            for index, value, speed in self._engine_motion(position, velocity):
+                pybullet.resetJointStateMultiDof(
+                    self._body,
+                    index,
+                    targetValue=value,
+                    targetVelocity=speed,
+                    physicsClientId=self._client,
+                )
 
     def _engine_motion(
         self, position: FloatArray, velocity: FloatArray
@@ -162,16 +163,17 @@ class BulletBody:
 
     def set_motion(self, position: FloatArray, velocity: FloatArray) -> None:
         """Set the joints' positions and all velocities, as of `set_state`; the base stays."""
-        if self._floating:
-            self._set_base_velocity(velocity[:3], velocity[3:6])
         motion = list(self._engine_motion(position, velocity))
-        pybullet.resetJointStatesMultiDof(  # takes lists only: tuples crash it
-            self._body,
-            [index for index, _, _ in motion],
-            targetValues=[value for _, value, _ in motion],
-            targetVelocities=[speed for _, _, speed in motion],
-            physicsClientId=self._client,
-        )
+        with self._client.alone():
+            if self._floating:
+                self._set_base_velocity(velocity[:3], velocity[3:6])
+            pybullet.resetJointStatesMultiDof(  # takes lists only: tuples crash it
+                self._body,
+                [index for index, _, _ in motion],
+                targetValues=[value for _, value, _ in motion],
+                targetVelocities=[speed for _, _, speed in motion],
+                physicsClientId=self._client,
+            )
 
     def forget_reading(self) -> None:
         """Forget what was read last: the engine's state is set to another one."""

@@ -7,13 +7,17 @@ which therefore is "C" wherever it reads a file.
 
 import tempfile
 import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import ClassVar, NoReturn
 
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError, ClosedError, SimulationError
+from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.bullet.c_library import c_numbers, captured_output
 from sim_node.physics.bullet.urdf_text import write_engine_urdf
+from sim_node.physics.settings import WorldSettings
 
 with captured_output("stdout", "stderr"):
     import pybullet
@@ -28,9 +32,16 @@ class Engine:
     for at each call, and a closed engine refuses it. One that nothing refers to is closed.
     """
 
-    def __init__(self) -> None:
+    _threshold_in_force: ClassVar[float] = WorldSettings.contact_breaking_threshold
+    _turns: ClassVar = fork_safe_lock()
+
+    def __init__(
+        self, breaking_threshold: float = WorldSettings.contact_breaking_threshold
+    ) -> None:
+        """Start it; `breaking_threshold` is that of its contacts, m."""
         number = int(pybullet.connect(pybullet.DIRECT))
         self._number: int | None = number
+        self._breaking_threshold = breaking_threshold
         self._disconnect = weakref.finalize(self, pybullet.disconnect, number)
         self._disconnect.atexit = False  # the process takes its engines with it
 
@@ -43,6 +54,25 @@ class Engine:
         if self._number is None:
             raise ClosedError("it is closed: its engine has ended; make a new one")
         return self._number
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """While no other engine of the process works, and with this one's threshold in force.
+
+        PyBullet has one threshold for the engines of a process. By it the engine looks for what
+        may touch, whenever it steps and whenever something is put somewhere; the order in which
+        it finds contacts tells of it ever after. Threads take turns; one may enter again.
+
+        Raises:
+            ClosedError: it is closed.
+        """
+        with Engine._turns:
+            if Engine._threshold_in_force != self._breaking_threshold:
+                pybullet.setPhysicsEngineParameter(
+                    contactBreakingThreshold=self._breaking_threshold, physicsClientId=self
+                )
+                Engine._threshold_in_force = self._breaking_threshold
+            yield
 
     def __reduce__(self) -> NoReturn:
         raise SimulationError("an engine, and what is in it, can be neither copied nor pickled")

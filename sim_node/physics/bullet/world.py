@@ -4,7 +4,6 @@ import tempfile
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import SimulationError
 from msgs_config.messages.throw import ProjectileThrow
-from msgs_config.runtime.fork_safe import fork_safe_lock
 from sim_node.physics.bullet.balls import BulletBalls
 from sim_node.physics.bullet.body import BulletBody
 from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
@@ -34,19 +32,16 @@ class BulletWorld:
     Restore right after a step: the engine keeps an effort that was applied but not stepped yet.
     """
 
-    # The threshold in force: the engine has one for all worlds of a process.
-    _breaking_threshold: ClassVar[float] = WorldSettings.contact_breaking_threshold
-    _stepping: ClassVar = fork_safe_lock()  # worlds may step in several threads
-
     def __init__(self, settings: WorldSettings) -> None:
         """Start the engine.
 
         Raises:
             CharacterError: the terrain cannot be loaded.
         """
-        self._client = Engine()
+        self._client = Engine(settings.contact_breaking_threshold)
         try:
-            self._furnish(settings)
+            with self._client.alone():
+                self._furnish(settings)
         except BaseException:
             self.close()
             raise
@@ -54,7 +49,6 @@ class BulletWorld:
     def _furnish(self, settings: WorldSettings) -> None:
         """Put all into the world that is there before the characters."""
         self._link_friction = settings.link_friction
-        self._own_breaking_threshold = settings.contact_breaking_threshold
         self.set_gravity(settings.gravity)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=settings.step_s,
@@ -88,14 +82,15 @@ class BulletWorld:
 
         No degree of freedom is let be faster than `speed_bound`, rad/s or m/s.
         """
-        return BulletBody(
-            self._client,
-            character,
-            friction=self._link_friction,
-            speed_bound=speed_bound,
-            touched=self.touched_links,
-            balls=self.balls,
-        )
+        with self._client.alone():
+            return BulletBody(
+                self._client,
+                character,
+                friction=self._link_friction,
+                speed_bound=speed_bound,
+                touched=self.touched_links,
+                balls=self.balls,
+            )
 
     def set_gravity(self, gravity: float) -> None:
         """Set gravity in m/s^2 along -z."""
@@ -104,13 +99,7 @@ class BulletWorld:
     def step(self) -> None:
         """Advance by one engine step; efforts last one step and are to be applied again."""
         self._touched = None
-        with BulletWorld._stepping:
-            if BulletWorld._breaking_threshold != self._own_breaking_threshold:
-                BulletWorld._breaking_threshold = self._own_breaking_threshold
-                pybullet.setPhysicsEngineParameter(
-                    contactBreakingThreshold=self._own_breaking_threshold,
-                    physicsClientId=self._client,
-                )
+        with self._client.alone():
             pybullet.stepSimulation(physicsClientId=self._client)
 
     def touched_links(self) -> TouchedLinks:
@@ -169,8 +158,8 @@ class BulletWorld:
     def from_bytes(self, state: bytes, throws: Sequence[ProjectileThrow] = ()) -> None:
         """Restore a state of `to_bytes`, exactly, in which there were the balls of `throws`."""
         self._touched = {}  # the engine would restore the saved state's contacts, too
-        self.balls.replace(throws)
-        with tempfile.TemporaryDirectory() as directory:
+        with self._client.alone(), tempfile.TemporaryDirectory() as directory:
+            self.balls.replace(throws)
             file = Path(directory) / _STATE_FILE
             file.write_bytes(state)
             pybullet.restoreState(fileName=str(file), physicsClientId=self._client)

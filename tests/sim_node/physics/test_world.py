@@ -9,6 +9,7 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.engine import make_world
 from sim_node.physics.settings import WorldSettings
 from tests.support.physics import (
@@ -117,6 +118,42 @@ def test_two_worlds_at_once_do_not_disturb_each_other(threshold: float) -> None:
             trajectory(other, disturbance, 1)
 
     assert b"".join(steps) == expected
+
+
+def life(before_each: Callable[[], None]) -> bytes:
+    """Every bit of what becomes of a humanoid that falls, is moved, thrown at and restored."""
+    before_each()
+    world = LoneWorld(character("humanoid"), WorldSettings())
+    states, effort = [], wriggling(1)
+    with world:
+        before_each()
+        world.body.set_state(np.array(character("humanoid").rest_position), np.zeros(SIZE))
+        for tick in range(240):
+            before_each()
+            if tick == 40:
+                world.balls.add(ProjectileThrow(2.0, 0.1, (1.0, 0.0, 1.0), (-9.0, 0.0, 1.0)))
+            elif tick == 100:
+                world.body.set_motion(*world.body.read())
+            elif tick == 110:
+                saved, balls = world.to_bytes(), world.balls.throws
+            elif tick == 130:
+                world.balls.place(0, (0.0, 0.0, 1.0))
+            elif tick == 160:
+                world.from_bytes(saved, balls)
+            before_each()
+            advance(world, effort())
+            wrenches, _ = world.body.contact_wrenches()
+            states += [part.tobytes() for part in (*world.body.read(), wrenches)]
+    return b"".join(states)
+
+
+@pytest.mark.parametrize("threshold", [0.1, 0.3])
+def test_what_other_worlds_did_before_in_the_process_does_not_matter(threshold: float) -> None:
+    alone = life(lambda: None)
+    with LoneWorld(character("pendulum"), WorldSettings(contact_breaking_threshold=threshold)) as w:
+        among_others = life(lambda: advance(w, np.zeros(1)))
+
+    assert among_others == alone
 
 
 # --- physics -------------------------------------------------------------------------------------
