@@ -1,4 +1,6 @@
-"""The command `actuated_characters export`: a run, a bag or a clip as CSV, BVH or glTF."""
+"""The command `actuated_characters export`: a run, a bag or a clip as CSV, BVH or glTF; a policy as
+ONNX.
+"""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -7,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import (
+    CHARACTER,
     Commands,
     add_command,
     add_robot,
@@ -20,11 +23,12 @@ if TYPE_CHECKING:  # it takes a while to import
     from character_motion.export.trajectories import Trajectories
     from msgs_config.arrays import FloatArray
 
-_CSV, _BVH, _GLTF = "CSV", "BVH", "glTF"
+_CSV, _BVH, _GLTF, _ONNX = "CSV", "BVH", "glTF", "ONNX"
 _BINARY = ".glb"
-_FORMATS = {".csv": _CSV, ".bvh": _BVH, _BINARY: _GLTF, ".gltf": _GLTF}
+_FORMATS = {".csv": _CSV, ".bvh": _BVH, _BINARY: _GLTF, ".gltf": _GLTF, ".onnx": _ONNX}
 _KNOWN_TO = {  # the formats of options that not every format has
     "reference": (_CSV,),
+    **dict.fromkeys(("topic", "base"), (_CSV, _BVH, _GLTF)),
     **dict.fromkeys(("from", "to", "fps"), (_BVH, _GLTF)),
     **dict.fromkeys(("units", "order"), (_BVH,)),
     "ground": (_GLTF,),
@@ -39,25 +43,28 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         commands,
         _export,
         "export",
-        "write a run, a bag or a clip as CSV, BVH or glTF",
+        "write a run, a bag or a clip as CSV, BVH or glTF, or a policy as ONNX",
         "Write a recorded run or a clip as the suffix of --output says. .csv has one row a state: "
         "time_s (since the first state), stamp_ns, episode (from 1), then position.DOF (rad or "
         "m), velocity.DOF (rad/s or m/s) and effort.DOF (N m or N, applied in the tick before the "
         "state; empty where there was none) of each degree of freedom, read back to the last bit; "
         "of a clip time_s and positions. .bvh is the skeleton of one character; .glb (binary) and "
         ".gltf (text) are all characters with their shapes and colours, and thrown balls. Both "
-        "are y up, forward is z.",
+        "are y up, forward is z. .onnx is a trained policy for other runtimes, with joint names, "
+        "gains and scales in its metadata (docs/policies.md).",
         [
             "export runs/demo --output demo.csv",
             "export runs/demo --output demo.glb",
             "export walk --output walk.bvh --units cm",
+            "export walk --output walk.onnx",
             "export runs/demo --topic description_joint_states --output robot.glb",
         ],
     )
     export.add_argument(
         "source",
         metavar="SOURCE",
-        help="a run's directory, a bag, or a clip: its name, or a .txt or .json file",
+        help="a run's directory, a bag, or a clip: its name, or a .txt or .json file; for ONNX a "
+        "policy: its name, or a file of `train`",
     )
     export.add_argument(
         "--output", type=Path, required=True, metavar="FILE", help=f"a {_suffixes()} file"
@@ -108,7 +115,8 @@ def _export(options: argparse.Namespace) -> None:
                 f"--{name} is of {' and '.join(kinds)}; {options.output} is none"
             )
     _check_output(options.output, overwrite=options.overwrite)
-    (_write_table if kind == _CSV else _write_motion)(options, kind)
+    writers = {_CSV: _write_table, _ONNX: _write_policy}
+    writers.get(kind, _write_motion)(options, kind)
 
 
 def _check_output(file: Path, *, overwrite: bool) -> None:
@@ -143,6 +151,22 @@ def _write_table(options: argparse.Namespace, kind: str) -> None:
     else:
         write_clip(read_source(options.source, robot), options.output)
     print(options.output)
+
+
+def _write_policy(options: argparse.Namespace, kind: str) -> None:
+    from actuated_characters.export.onnx_policy import onnx_model
+    from controller_node.planner.policy.file import read_policy
+    from msgs_config.character.loading import load_character
+
+    del kind
+    character = load_character(options.character or CHARACTER)
+    model = onnx_model(read_policy(options.source, character), character)
+    write_whole(options.output, model.SerializeToString())
+    sizes = [
+        f"{end.name} {end.type.tensor_type.shape.dim[1].dim_value}"
+        for end in (*model.graph.input, *model.graph.output)
+    ]
+    print(f"{options.output}: {', '.join(sizes)}")
 
 
 def _write_motion(options: argparse.Namespace, kind: str) -> None:

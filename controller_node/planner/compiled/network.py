@@ -8,7 +8,10 @@ from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import SingleArray
 
 _AT_ONCE = 4  # inputs, so that a sum is read and written once for all of them
-_LARGEST = 4.97  # beyond it the tanh below is no longer between -1 and 1
+LARGEST_INPUT = 4.97  # of the tanh below, which beyond is no longer between -1 and 1
+# Coefficients of tanh x = x above(x^2) / below(x^2), the highest ones first.
+TANH_ABOVE = tuple(map(np.float32, (1.0, 378.0, 17325.0, 135135.0)))
+TANH_BELOW = tuple(map(np.float32, (28.0, 3150.0, 62370.0, 135135.0)))
 
 
 class Network(NamedTuple):
@@ -56,11 +59,10 @@ def squash(values: SingleArray) -> None:
 
     No library's tanh, whose last bits differ. (Lambert 1770: tanh x = x / (1 + x^2 / (3 + ...)).)
     """
+    a, b = TANH_ABOVE, TANH_BELOW
     for i in range(len(values)):
-        x = min(max(values[i], np.float32(-_LARGEST)), np.float32(_LARGEST))
+        x = min(max(values[i], np.float32(-LARGEST_INPUT)), np.float32(LARGEST_INPUT))
         s = x * x
-        above = np.float32(135135.0) + s * (np.float32(17325.0) + s * (np.float32(378.0) + s))
-        below = np.float32(135135.0) + s * (
-            np.float32(62370.0) + s * (np.float32(3150.0) + s * np.float32(28.0))
-        )
+        above = a[3] + s * (a[2] + s * (a[1] + s * a[0]))
+        below = b[3] + s * (b[2] + s * (b[1] + s * b[0]))
         values[i] = x * above / below

@@ -14,7 +14,7 @@ from msgs_config.arrays import FloatArray, SingleArray
 from msgs_config.compiled.rotations import axes, quaternion, to_parent
 
 FRAME_VECTORS = 12  # numbers of a frame that are vectors, without the end effectors
-_MOST = 5.0  # scales that an entry may be off
+MOST_SCALES = 5.0  # that an entry may be off
 
 
 class ObservationScales(NamedTuple):
@@ -90,13 +90,15 @@ def observe(
     """Write an observation of a deviation (f,), and of frames (frames, d): the first one is now."""
     size, vectors = len(deviation), len(deviation) - scales.centre + 3
     for i in range(size):
-        observation[i] = min(max(deviation[i] / scales.deviation[i], -_MOST), _MOST)
+        observation[i] = min(max(deviation[i] / scales.deviation[i], -MOST_SCALES), MOST_SCALES)
     for k in range(len(frames)):
         start = size + k * frames.shape[1]
         _write_relative(observation[start:], frames[k], frames[0], facing, vectors)
         for i in range(frames.shape[1]):
             off = observation[start + i] - scales.frame_mean[k, i]
-            observation[start + i] = min(max(off / scales.frame_scale[k, i], -_MOST), _MOST)
+            observation[start + i] = min(
+                max(off / scales.frame_scale[k, i], -MOST_SCALES), MOST_SCALES
+            )
 
 
 @compiled
