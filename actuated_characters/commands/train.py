@@ -6,6 +6,7 @@ import os
 import shlex
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,13 +27,13 @@ from msgs_config.errors import ConfigurationError
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
     from actuated_characters.training.acceptance import Trial
+    from actuated_characters.training.exercises import Exercise
     from actuated_characters.training.training import Job, Progress, Training
     from controller_node.controller_settings import ControllerSettings
     from controller_node.tracked_reference import TrackedReference
 
 _FOLDER, _SUFFIX = Path("policies"), ".npz"
 _DECISIONS_A_MINUTE = 500_000  # on two processors
-_WRAPPED_S = 60.0  # length of the last runs of a clip that goes on from its end
 _TRIALS = 5
 _NAMED_CLIPS = 3  # in the name of a file
 _USED = ("plan.weight.", "plan.gives_way")  # what training takes of a planner's parameters
@@ -45,11 +46,15 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         _train,
         "train",
         "train a policy that keeps a motion by joint torques alone",
-        "Train a small network that answers each state with offsets to a clip's angles, as a "
+        "Train a small network that answers each state with offsets to a motion's angles, as a "
         "planner does, by trying in many worlds at once (proximal policy optimisation). Ctrl-C "
         "ends it and keeps the best so far. Play the result with `run --clip CLIP --planner policy "
         "--set controller_node.policy:=FILE`.",
-        ["train --clip walk --minutes 10", "train --clip walk --pushes 60 --output walk.npz"],
+        [
+            "train --clip walk --minutes 10",
+            "train --clip walk --pushes 60 --output walk.npz",
+            "train --steer --minutes 40",
+        ],
     )
     add_character(command)
     command.add_argument(
@@ -57,6 +62,12 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         action="append",
         metavar="NAME",
         help="name of a clip, or a file; may be repeated: one policy for all of them (walk)",
+    )
+    command.add_argument(
+        "--steer",
+        action="store_true",
+        help="learn to go where cmd_vel says, by the clips of `--reference steered`; beside "
+        "clips, where --clip names some",
     )
     command.add_argument(
         "--minutes",
@@ -97,13 +108,17 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
-    clips = tuple(options.clip or ("walk",))
-    output = _output(options, clips)
+    from actuated_characters.training.exercises import STEERED, Exercise
+
+    clips = options.clip or ([] if options.steer else ["walk"])
+    names = (*clips, STEERED) if options.steer else tuple(clips)
+    exercises = tuple(Exercise(options.character, name) for name in names)
+    output = _output(options, names)
     from actuated_characters.training.training import Training, check_start
     from controller_node.planner.policy.file import read_policy
 
     began = time.process_time()
-    job, start = _job(options, clips), None
+    job, start = _job(options, exercises), None
     if options.resume and output.exists():
         start = read_policy(str(output), job.character)
         check_start(job, start)
@@ -114,12 +129,12 @@ def _train(options: argparse.Namespace) -> None:
     finally:
         training.close()
     try:
-        trials = _try(options, clips, output)
+        trials = _try(options, exercises, output)
     except KeyboardInterrupt:
         _say(f"interrupted; {output} has no figures of runs of its own")
         trials = {}
     _report(training, output, trials, spent)
-    _say_how_to_play(options, clips[0], output)
+    _say_how_to_play(options, exercises[0], output)
 
 
 def _go_on(training: "Training", job: "Job", output: Path) -> float:
@@ -133,6 +148,8 @@ def _go_on(training: "Training", job: "Job", output: Path) -> float:
                 bar.update(bar.task_ids[0], completed=progress.decisions, state=_words(progress))
                 if progress.is_better:
                     training.save(output, {})
+                    if not bar.console.is_terminal:  # there the bar shows nothing until the end
+                        _say(f"{progress.decisions:,} of {job.decisions:,}: {_words(progress)}")
     except KeyboardInterrupt as interrupted:
         if not training.has_best:
             raise  # so soon there is nothing better than what FILE may have
@@ -155,9 +172,9 @@ def _words(progress: "Progress") -> str:
     )
 
 
-def _output(options: argparse.Namespace, clips: tuple[str, ...]) -> Path:
+def _output(options: argparse.Namespace, exercises: tuple[str, ...]) -> Path:
     """The policy's file; raises ConfigurationError where it cannot be written."""
-    names = [Path(clip).stem for clip in clips]
+    names = [Path(name).stem for name in exercises]
     if len(names) > _NAMED_CLIPS:
         names[_NAMED_CLIPS:] = [f"and-{len(names) - _NAMED_CLIPS}-more"]
     name = "-".join((Path(options.character).stem, *names))
@@ -176,14 +193,13 @@ def _output(options: argparse.Namespace, clips: tuple[str, ...]) -> Path:
     return output
 
 
-def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
+def _job(options: argparse.Namespace, exercises: "Sequence[Exercise]") -> "Job":
     """What the options say; raises ActuatedCharactersError if it cannot be trained."""
     from actuated_characters.training.references import TrainedReference
     from actuated_characters.training.training import Job
     from controller_node.controller_settings import check_planned
     from controller_node.parameters import make_controller_settings
     from controller_node.planner.settings import make_planner_settings
-    from msgs_config.clips.reading import read_clip
 
     given = _given(options)
     threads = options.threads if options.threads is not None else len(os.sched_getaffinity(0))
@@ -193,18 +209,17 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     ):
         if not least <= value < math.inf:
             raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
-    plans = [_plan(options, clip, given) for clip in clips]
+    plans = [_plan(exercise, given, options.seed) for exercise in exercises]
     character, values = plans[0].character, plans[0].controller
     settings = make_controller_settings(character, values)
     check_planned(settings)
-    frames = [read_clip(character, clip) for clip in clips]
     return Job(
         character,
         [
-            TrainedReference(_tracked(plan, settings), float(each.times[-1]), each.wraps)
-            for plan, each in zip(plans, frames, strict=True)
+            TrainedReference(_tracked(plan, settings), each.cycle_s, each.wraps)
+            for plan, each in zip(plans, exercises, strict=True)
         ],
-        clips,
+        tuple(each.name for each in exercises),
         make_planner_settings(character, values),
         settings.gains,
         round(_DECISIONS_A_MINUTE * options.minutes),
@@ -214,18 +229,17 @@ def _job(options: argparse.Namespace, clips: tuple[str, ...]) -> "Job":
     )
 
 
-def _plan(options: argparse.Namespace, clip: str, given: dict[str, object]) -> "RunPlan":
-    """A planned run of a clip, with the parameters that a reconstructed one was found with."""
-    from actuated_characters.runs.plan import make_plan
+def _plan(exercise: "Exercise", given: dict[str, object], seed: int) -> "RunPlan":
+    """A planned run, with the parameters that a reconstructed clip was found with."""
     from controller_node.planner.settings import PREDICTIVE
     from msgs_config.character.loading import load_character
 
     simulator, controller = dict[str, object](), dict(given)
-    bring_parameters(load_character(options.character), clip, simulator, controller)
+    if not exercise.is_steered:
+        character = load_character(exercise.character)
+        bring_parameters(character, exercise.name, simulator, controller)
     controller |= {"planner": PREDICTIVE, "plan.workers": 1}
-    return make_plan(
-        options.character, 1.0, {"reference": "clip", "clip": clip}, simulator, controller
-    )
+    return exercise.plan(exercise.cycle_s, simulator, controller, seed)
 
 
 def _tracked(plan: "RunPlan", settings: "ControllerSettings") -> "TrackedReference":
@@ -257,24 +271,21 @@ def _given(options: argparse.Namespace) -> dict[str, object]:
 
 
 def _try(
-    options: argparse.Namespace, clips: tuple[str, ...], output: Path
+    options: argparse.Namespace, exercises: "Sequence[Exercise]", output: Path
 ) -> "dict[str, list[Trial]]":
-    """Runs of the policy, by clip and engine, as `run` makes them, with seeds of their own."""
+    """Runs of the policy, by exercise and engine, as `run` makes them, with seeds of their own."""
     from actuated_characters.training.acceptance import attempt
-    from msgs_config.character.loading import load_character
-    from msgs_config.clips.reading import read_clip
     from sim_node.physics.engine import INSTALLED_ENGINES
 
-    character, given = options.character, _given(options)
-    frames = {clip: read_clip(load_character(character), clip) for clip in clips}
-    jobs = [(clip, engine) for clip in clips for engine in INSTALLED_ENGINES]
+    given = _given(options)
+    jobs = [(exercise, engine) for exercise in exercises for engine in INSTALLED_ENGINES]
     trials: dict[str, list[Trial]] = {}
     with progress_bar("runs of its own", len(jobs) * _TRIALS, "runs", transient=True) as bar:
-        for clip, engine in jobs:
-            seconds = _WRAPPED_S if frames[clip].wraps else float(frames[clip].times[-1])
-            found = trials.setdefault(f"{clip}, {engine}", [])
-            for seed in range(1, _TRIALS + 1):
-                found.append(attempt(character, clip, given, output, seconds, engine, seed))
+        for exercise, engine in jobs:
+            found = trials.setdefault(f"{exercise.name}, {engine}", [])
+            for number in range(1, _TRIALS + 1):
+                seed = options.seed + number  # another one than the training's
+                found.append(attempt(exercise, given, output, engine, seed))
                 bar.advance(bar.task_ids[0])
     return trials
 
@@ -306,8 +317,8 @@ def _report(
     Console().print(make_facts_table(str(output), facts))
 
 
-def _say_how_to_play(options: argparse.Namespace, clip: str, output: Path) -> None:
-    words = ["actuated_characters", "run", "--clip", clip, "--planner", "policy"]
+def _say_how_to_play(options: argparse.Namespace, exercise: "Exercise", output: Path) -> None:
+    words = ["actuated_characters", "run", *exercise.options, "--planner", "policy"]
     if options.character != CHARACTER:
         words += ["--character", options.character]
     for text in (f"controller_node.policy:={output}", *options.set):

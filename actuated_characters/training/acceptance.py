@@ -9,8 +9,8 @@ import numpy as np
 
 from actuated_characters.metrics.error_measures import is_lost, joint_errors
 from actuated_characters.runs.bare_loop import ticks_in_process
-from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import plan_push
+from actuated_characters.training.exercises import Exercise
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError
 
@@ -30,26 +30,16 @@ class Trial:
 
 
 def attempt(
-    character: str,
-    clip: str,
-    given: Mapping[str, object],
-    policy: Path,
-    seconds: float,
-    engine: str,
-    seed: int,
+    exercise: Exercise, given: Mapping[str, object], policy: Path, engine: str, seed: int
 ) -> Trial:
     """Run a policy with a jolt from a side that the seed says; `given` are controller_node's.
 
     Raises:
         ActuatedCharactersError: a name or a value is wrong.
     """
-    plan = make_plan(
-        character,
-        seconds,
-        {"reference": "clip", "clip": clip},
-        {"engine": engine, "wrench_duration": _JOLT_LASTS},
-        {**given, "planner": "policy", "policy": str(policy)},
-    )
+    seconds, simulator = exercise.tried_s, {"engine": engine, "wrench_duration": _JOLT_LASTS}
+    controller = {**given, "planner": "policy", "policy": str(policy)}
+    plan = exercise.plan(seconds, simulator, controller, seed)
     side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
     force = _JOLT_NS / _JOLT_LASTS
     root = plan.character.links[0].name

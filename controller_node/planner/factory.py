@@ -99,23 +99,23 @@ def describe_planner(character: Character, values: Values, gains: GainArrays) ->
 def _read_policy(character: Character, values: Values) -> "Policy":
     """The policy that the parameters' values say, at this controller's rate.
 
-    Without a name it is the shipped one of the clip that is tracked.
+    Without a name it is the shipped one of the clip that is tracked, or of what is steered.
     """
     from controller_node.planner.policy.file import read_policy, shipped_policies
 
     given, reference = PlannerParameters.of(values), MotionSettings.of(values).reference
-    clip = ClipSettings.of(values).clip if reference == "clip" else ""
-    name = given.policy or (clip if clip in shipped_policies() else "")
+    motion = ClipSettings.of(values).clip if reference == "clip" else reference
+    name = given.policy or (motion if motion in shipped_policies() else "")
     policy = read_policy(name, character)
     if policy.rate_hz != given.rate_hz:
         raise ConfigurationError(
             f"parameter 'rate' is {given.rate_hz}; the policy '{name}' is for {policy.rate_hz}"
         )
-    clips = policy.about["clips"]
-    if Path(clip).stem not in [Path(each).stem for each in clips]:
-        tracked = f"the clip is {clip}" if clip else f"'reference' is {reference}"
+    trained = policy.about["clips"]
+    if Path(motion).stem not in [Path(each).stem for each in trained]:
+        tracked = f"the clip is {motion}" if reference == "clip" else f"'reference' is {reference}"
         raise ConfigurationError(
-            f"the policy '{name}' was trained on {', '.join(clips)}; {tracked}"
+            f"the policy '{name}' was trained on {', '.join(trained)}; {tracked}"
         )
     return policy
 

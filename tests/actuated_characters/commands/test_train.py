@@ -1,6 +1,7 @@
 """The command `train`: from options to a file that `run` plays."""
 
 import json
+import shlex
 import signal
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,8 +12,9 @@ import pytest
 from actuated_characters.cli import main
 from actuated_characters.commands import train
 from actuated_characters.commands.common.interruption import Interrupted
-from actuated_characters.training import acceptance
+from actuated_characters.training import acceptance, exercises
 from actuated_characters.training.acceptance import Trial
+from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.training import Progress, Training
 from controller_node.planner.policy.file import read_policy
 from tests.support.physics import DATA
@@ -28,7 +30,8 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     make_small(monkeypatch)
     monkeypatch.setattr(train, "_DECISIONS_A_MINUTE", 6_400)
-    monkeypatch.setattr(train, "_WRAPPED_S", 0.4)
+    monkeypatch.setattr(exercises, "_TRIED_S", 0.4)
+    monkeypatch.setattr(exercises, "_DRIVEN_S", 1.0)
     monkeypatch.setattr(train, "_TRIALS", 2)
 
 
@@ -53,11 +56,28 @@ def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert not summary["fell"]
 
 
+@pytest.mark.slow
+def test_what_learned_to_be_steered_is_steered(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["train", *FEW, "--steer"]) == 0
+
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.splitlines() if line.startswith("play it:")]
+    words = shlex.split(line.removeprefix("play it: actuated_characters "))
+    policy = read_policy("policies/humanoid-steered.npz", HUMANOID)
+    assert policy.about["clips"] == ["steered"]
+    assert main([*words, "--in-process", "--duration", "0.4", "--output", "run"]) == 0
+    assert not json.loads((tmp_path / "run" / "summary.json").read_text())["fell"]
+    assert main(["run", "--clip", "walk", *words[words.index("--planner") :]]) == 1
+    assert "was trained on steered; the clip is walk" in capsys.readouterr().err
+
+
 def test_it_says_how_to_play_another_character(capsys: pytest.CaptureFixture[str]) -> None:
     parser_given = ["--character", "my robot.urdf", "--set", "controller_node.rate:=120"]
     options = _options(["train", *parser_given])
 
-    train._say_how_to_play(options, "my clip.csv", Path("a b.npz"))
+    train._say_how_to_play(options, Exercise("my robot.urdf", "my clip.csv"), Path("a b.npz"))
 
     assert capsys.readouterr().out.split("play it: ")[1].strip() == (
         "actuated_characters run --clip 'my clip.csv' --planner policy --character "

@@ -1,0 +1,99 @@
+"""What a policy is to keep: a clip, or where a driver of all moods steers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned.velocities import plan_velocities
+from controller_node.references.steering.reference import SteeredReference
+from controller_node.references.steering.velocity import SteeringLimits
+from msgs_config.character.loading import load_character
+from msgs_config.clips.reading import ClipFrames, read_clip
+
+STEERED = "steered"
+_DRIVEN_S = 240.0  # of a drive in which episodes begin
+_TRIED_S = 60.0  # of the last runs of what does not end
+_MOOD_S = (1.0, 4.0)  # least and most time for which a driver wants the same
+_STOPS, _MANOEUVRES, _BENDS = 0.15, 0.15, 0.5  # shares of moods; of what goes ahead, of bends
+_SHARPEST = 1.5  # m/s^2 to the side, that a driver wants
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """A motion of a character, by its name or file."""
+
+    character: str
+    name: str  # a clip's name or file, or `STEERED`
+
+    @property
+    def is_steered(self) -> bool:
+        """Whether velocities say where it goes."""
+        return self.name == STEERED
+
+    @cached_property
+    def cycle_s(self) -> float:
+        """Time in which episodes begin; raises ActuatedCharactersError if there is no such clip."""
+        return _DRIVEN_S if self.is_steered else float(self._frames.times[-1])
+
+    @property
+    def wraps(self) -> bool:
+        """Whether it goes on from its end."""
+        return not self.is_steered and self._frames.wraps
+
+    @property
+    def tried_s(self) -> float:
+        """Length of a run that tries it."""
+        return _TRIED_S if self.is_steered or self.wraps else self.cycle_s
+
+    @property
+    def options(self) -> list[str]:
+        """Of `run`, so that it plays it."""
+        if self.is_steered:
+            return ["--cmd-vel", "1,0,0@0"]
+        return ["--clip", self.name]
+
+    def plan(
+        self,
+        seconds: float,
+        simulator: Mapping[str, object],
+        controller: Mapping[str, object],
+        seed: int,
+    ) -> RunPlan:
+        """A run of it; `seed` says where it is steered.
+
+        Raises:
+            ActuatedCharactersError: a name or a value is wrong.
+        """
+        motion = {"reference": STEERED}
+        if not self.is_steered:
+            motion = {"reference": "clip", "clip": self.name}
+        plan = make_plan(self.character, seconds, motion, simulator, controller)
+        if not isinstance(plan.reference, SteeredReference):
+            return plan
+        drive = random_drive(plan.reference.limits, seconds, seed)
+        return plan_velocities(plan, drive)[0]
+
+    @cached_property
+    def _frames(self) -> ClipFrames:
+        return read_clip(load_character(self.character), self.name)
+
+
+def random_drive(limits: SteeringLimits, seconds: float, seed: int) -> str:
+    """Velocities as `--cmd-vel` takes them: ahead at any speed, bends, to the sides, and stops."""
+    rng, time, drive = np.random.default_rng((seed, 7)), 0.0, list[str]()
+    ahead = min(limits.region.ahead, limits.speed)
+    back, aside = (min(each, limits.speed) for each in (limits.region.back, limits.region.aside))
+    while time < seconds:
+        mood, velocity = rng.random(), (0.0, 0.0, 0.0)
+        if mood > 1.0 - _MANOEUVRES:
+            velocity = rng.uniform(-back, back), rng.uniform(-aside, aside), 0.0
+        elif mood > _STOPS:
+            speed = rng.uniform(0.0, ahead)
+            most = min(limits.turn_rate, limits.region.turn, _SHARPEST / max(speed, 1e-3))
+            velocity = speed, 0.0, rng.uniform(-most, most) * (rng.random() < _BENDS)
+        drive.append(",".join(f"{each:.2f}" for each in velocity) + f"@{time:.2f}")
+        time += rng.uniform(*_MOOD_S)
+    return " ".join(drive)
