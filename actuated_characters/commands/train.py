@@ -22,7 +22,7 @@ from actuated_characters.commands.common.settings import (
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_facts_table
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
@@ -134,6 +134,8 @@ def _train(options: argparse.Namespace) -> None:
         _say(f"interrupted; {output} has no figures of runs of its own")
         trials = {}
     _report(training, output, trials, spent)
+    if trials:
+        _show(options, exercises[0], output)
     _say_how_to_play(options, exercises[0], output)
 
 
@@ -239,7 +241,7 @@ def _plan(exercise: "Exercise", given: dict[str, object], seed: int) -> "RunPlan
         character = load_character(exercise.character)
         bring_parameters(character, exercise.name, simulator, controller)
     controller |= {"planner": PREDICTIVE, "plan.workers": 1}
-    return exercise.plan(exercise.cycle_s, simulator, controller, seed)
+    return exercise.plan(exercise.cycle_s, simulator, controller, seed)[0]
 
 
 def _tracked(plan: "RunPlan", settings: "ControllerSettings") -> "TrackedReference":
@@ -288,6 +290,26 @@ def _try(
                 found.append(attempt(exercise, given, output, engine, seed))
                 bar.advance(bar.task_ids[0])
     return trials
+
+
+def _show(options: argparse.Namespace, exercise: "Exercise", output: Path) -> None:
+    """Keep a run, its picture and its film beside the policy's file."""
+    from actuated_characters.training.exhibition import keep_run
+
+    controller = {**_given(options), "planner": "policy", "policy": str(output)}
+    directory = output.with_suffix("").absolute()
+    try:
+        with progress_bar("a run to look at", 1.0, transient=True) as bar:
+
+            def progress(share: float) -> None:
+                bar.update(bar.task_ids[0], completed=share)
+
+            for path in keep_run(exercise, controller, directory, options.seed + 1, progress):
+                print(path)
+    except KeyboardInterrupt:
+        _say(f"interrupted; the run in {directory} is not complete")
+    except ActuatedCharactersError as error:
+        _say(f"no run to look at: {error}")  # the policy is in its file, all the same
 
 
 def _report(

@@ -19,7 +19,7 @@ from controller_node.planner.compiled.observation import MOST_SCALES
 from controller_node.planner.policy.file import Policy
 from msgs_config.arrays import FloatArray, SingleArray
 from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError
+from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it is of an extra
     from onnx import ModelProto
@@ -45,14 +45,11 @@ def onnx_model(policy: Policy, character: Character) -> "ModelProto":
     """A policy of a character as an ONNX model.
 
     Raises:
-        ConfigurationError: the package `onnx` is not installed.
+        ConfigurationError: the extra `onnx` is not installed.
     """
-    try:
-        from onnx import TensorProto, checker, helper
-    except ImportError as error:
-        raise ConfigurationError(
-            ".onnx needs the package onnx: pip install 'actuated_characters[onnx]'"
-        ) from error
+    require_extra("onnx", "a policy as ONNX")
+    from onnx import TensorProto, checker, helper
+
     graph = _Graph()
     shift, scale = observation_scales(policy)
     at = graph.clip(graph.add("Div", graph.add("Sub", _INPUT, shift), scale), MOST_SCALES)

@@ -39,7 +39,7 @@ def attempt(
     """
     seconds, simulator = exercise.tried_s, {"engine": engine, "wrench_duration": _JOLT_LASTS}
     controller = {**given, "planner": "policy", "policy": str(policy)}
-    plan = exercise.plan(seconds, simulator, controller, seed)
+    plan, _ = exercise.plan(seconds, simulator, controller, seed)
     side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
     force = _JOLT_NS / _JOLT_LASTS
     root = plan.character.links[0].name

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from actuated_characters.runs.plan import RunPlan, make_plan
-from actuated_characters.runs.planned.velocities import plan_velocities
+from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.character.loading import load_character
@@ -61,8 +61,8 @@ class Exercise:
         simulator: Mapping[str, object],
         controller: Mapping[str, object],
         seed: int,
-    ) -> RunPlan:
-        """A run of it; `seed` says where it is steered.
+    ) -> tuple[RunPlan, list[PlannedVelocity]]:
+        """A run of it, and the velocities to send; `seed` says where it is steered.
 
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
@@ -72,9 +72,9 @@ class Exercise:
             motion = {"reference": "clip", "clip": self.name}
         plan = make_plan(self.character, seconds, motion, simulator, controller)
         if not isinstance(plan.reference, SteeredReference):
-            return plan
+            return plan, []
         drive = random_drive(plan.reference.limits, seconds, seed)
-        return plan_velocities(plan, drive)[0]
+        return plan_velocities(plan, drive)
 
     @cached_property
     def _frames(self) -> ClipFrames:

@@ -7,6 +7,7 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 PACKAGES = {
     "gymnasium": ("gymnasium",),
     "meshes": ("trimesh",),
+    "onnx": ("onnx",),
     "video": ("av",),
     "view": ("viser", "websockets"),
     "wheels": ("rclpy",),

@@ -54,6 +54,26 @@ def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert main([*words, "--in-process", "--duration", "0.3", "--output", "run"]) == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert not summary["fell"]
+    shown = Path("policies/humanoid-walk")
+    for name in ("bag", "summary.json", "strip.png", "video.mp4"):
+        assert (shown / name).exists()
+        assert name in ("bag", "summary.json") or str(shown / name) in said
+
+
+def test_files_where_its_run_would_go_are_left_alone(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(acceptance, "attempt", no_trials)
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "mine.txt").write_text("mine")
+
+    assert main(["train", *FEW, "--output", "walk.npz"]) == 0
+
+    said = capsys.readouterr()
+    assert "no run to look at: " in said.err and "holds other files" in said.err
+    assert "play it:" in said.out
+    assert [path.name for path in (tmp_path / "walk").iterdir()] == ["mine.txt"]
+    read_policy("walk.npz", HUMANOID)
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """A policy as ONNX: ONNX's own reference evaluator answers as the product's network does."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -79,14 +78,3 @@ def test_its_metadata_say_how_to_run_it(file: Path) -> None:
     assert len(dims) == len(said["observation_names"])
     assert sum(dims) == model.graph.input[0].type.tensor_type.shape.dim[1].dim_value
     assert said["observation_names"][-1] == "reference_joint_pos_in_0.3_s"
-
-
-def test_without_onnx_it_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "onnx", None)
-
-    assert main(["export", "walk", "--output", str(tmp_path / "walk.onnx")]) == 1
-
-    assert "pip install 'actuated_characters[onnx]'" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())

@@ -52,15 +52,16 @@ def test_a_drive_keeps_the_limits_and_is_told_by_its_seed(limits: SteeringLimits
 
 
 def test_a_steered_run_goes_where_the_drive_says() -> None:
-    plan = Exercise("humanoid", "steered").plan(10.0, {}, {}, 1)
+    plan, sent = Exercise("humanoid", "steered").plan(10.0, {}, {}, 1)
     way = np.array([plan.reference.sample(t).configuration.position[:2] for t in (0.0, 9.9)])
 
-    again = Exercise("humanoid", "steered").plan(10.0, {}, {}, 1)
-    other = Exercise("humanoid", "steered").plan(10.0, {}, {}, 2)
+    again, _ = Exercise("humanoid", "steered").plan(10.0, {}, {}, 1)
+    other, _ = Exercise("humanoid", "steered").plan(10.0, {}, {}, 2)
     end, same, another = (
         each.reference.sample(9.9).configuration.position[:2] for each in (plan, again, other)
     )
 
+    assert len(sent) > 4
     assert np.linalg.norm(way[1] - way[0]) > 0.5
     np.testing.assert_array_equal(end, same)
     assert np.linalg.norm(end - another) > 0.5

@@ -21,6 +21,7 @@ NEEDS = [  # package, extra, arguments
     ("viser", "view", ("view", "run")),
     ("av", "video", ("render", "run", "--output", "film.mp4")),
     ("av", "video", ("render", "run", "--video")),
+    ("onnx", "onnx", ("export", "walk", "--output", "walk.onnx")),
 ]
 
 
