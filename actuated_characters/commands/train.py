@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.training.exercises import Exercise
     from actuated_characters.training.training import Job, Progress, Training
     from controller_node.controller_settings import ControllerSettings
+    from controller_node.planner.policy.file import Policy
     from controller_node.tracked_reference import TrackedReference
 
 _FOLDER, _SUFFIX = Path("policies"), ".npz"
@@ -53,7 +54,7 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         [
             "train --clip walk --minutes 10",
             "train --clip walk --pushes 60 --output walk.npz",
-            "train --steer --minutes 40",
+            "train --steer --minutes 40 --from walk",
         ],
     )
     add_character(command)
@@ -92,8 +93,14 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         help=f"the policy ({_FOLDER}/CHARACTER-CLIP{_SUFFIX})",
     )
     command.add_argument("--overwrite", action="store_true", help="replace FILE")
-    command.add_argument(
-        "--resume", action="store_true", help="go on from the policy in FILE, if there is one"
+    start = command.add_mutually_exclusive_group()
+    start.add_argument(
+        "--resume", action="store_true", help="go on with the training in FILE, if there is one"
+    )
+    start.add_argument(
+        "--from",
+        metavar="POLICY",
+        help="begin with what a shipped policy, or one in a file, can, of whatever motion",
     )
     command.add_argument(
         "--set",
@@ -114,16 +121,13 @@ def _train(options: argparse.Namespace) -> None:
     names = (*clips, STEERED) if options.steer else tuple(clips)
     exercises = tuple(Exercise(options.character, name) for name in names)
     output = _output(options, names)
-    from actuated_characters.training.training import Training, check_start
-    from controller_node.planner.policy.file import read_policy
+    from actuated_characters.training.training import Training
 
     began = time.process_time()
-    job, start = _job(options, exercises), None
-    if options.resume and output.exists():
-        start = read_policy(str(output), job.character)
-        check_start(job, start)
+    job = _job(options, exercises)
+    start = _start(options, job, output)
     output.parent.mkdir(exist_ok=True)
-    training = Training(job, start)
+    training = Training(job, start, resumes=options.resume)
     try:
         spent = _go_on(training, job, output), time.process_time() - began
     finally:
@@ -229,6 +233,23 @@ def _job(options: argparse.Namespace, exercises: "Sequence[Exercise]") -> "Job":
         options.seed,
         threads,
     )
+
+
+def _start(options: argparse.Namespace, job: "Job", output: Path) -> "Policy | None":
+    """The policy that a training begins with; raises ConfigurationError if it cannot."""
+    from actuated_characters.training.training import check_resumed, check_start
+    from controller_node.planner.policy.file import read_policy
+
+    name = getattr(options, "from")
+    if options.resume and output.exists():
+        name = str(output)
+    if name is None:
+        return None
+    start = read_policy(name, job.character)
+    if options.resume:
+        check_resumed(job, start)
+    check_start(job, start)
+    return start
 
 
 def _plan(exercise: "Exercise", given: dict[str, object], seed: int) -> "RunPlan":

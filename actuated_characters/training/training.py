@@ -32,6 +32,7 @@ from msgs_config.errors import ConfigurationError
 _WORLDS, _DECISIONS = 64, 48  # of a trace
 _HIDDEN = 128
 _SPREADS = (0.35, 0.12)  # standard deviation of what is tried, at first and in the end
+_FIRST_SPREAD_FROM = 0.2  # at first where it begins with what another policy can
 _DIVERGENCES = (0.03, 0.008)  # of a policy from the one before, at first and in the end
 _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
 _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
@@ -79,11 +80,25 @@ def decisions_of(policy: Policy) -> int:
     return int(policy.about["trained"].get("decisions", 0))
 
 
+def check_resumed(job: Job, start: Policy) -> None:
+    """Raise ConfigurationError if a policy's training cannot go on as a job."""
+    clips, names = ", ".join(start.about["clips"]), ", ".join(job.names)
+    if clips != names:
+        raise ConfigurationError(
+            f"the policy's clips: {clips}, this training's: {names}; --resume goes on with the "
+            "same, --from begins with what a policy of other clips can"
+        )
+    if decisions_of(start) >= job.decisions:
+        raise ConfigurationError(
+            f"the policy was trained with {decisions_of(start):,} decisions, and all --minutes "
+            f"are {job.decisions:,}; --resume goes on with more"
+        )
+
+
 def check_start(job: Job, start: Policy) -> None:
-    """Raise ConfigurationError if a job cannot go on from a policy."""
+    """Raise ConfigurationError if a job cannot begin with a policy."""
     rate, hold = job.settings.parameters.rate_hz, start.hold
     for name, found, wanted in (
-        ("clips", ", ".join(start.about["clips"]), ", ".join(job.names)),
         ("rate", start.rate_hz, rate),
         ("hold", hold, hold_ticks(rate)),
         ("hidden layer", len(start.network.bias_1), _HIDDEN),
@@ -91,8 +106,7 @@ def check_start(job: Job, start: Policy) -> None:
     ):
         if found != wanted:
             raise ConfigurationError(
-                f"the policy's {name}: {found}, this training's: {wanted}; "
-                "--resume goes on with the same"
+                f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
             )
     for name, given, own in (
         ("sigma", start.unit, action_unit(job.settings)),
@@ -101,22 +115,21 @@ def check_start(job: Job, start: Policy) -> None:
     ):
         if not np.array_equal(given, own):
             raise ConfigurationError(
-                f"the policy was trained with another {name}; --resume goes on with the same"
+                f"the policy was trained with another {name}; it must be the same"
             )
-    if decisions_of(start) >= job.decisions:
-        raise ConfigurationError(
-            f"the policy was trained with {decisions_of(start):,} decisions, and all --minutes "
-            f"are {job.decisions:,}; --resume goes on with more"
-        )
 
 
 class Training:
     """Policies of a job, one better than the other. The same job gives the same policies."""
 
-    def __init__(self, job: Job, start: Policy | None = None) -> None:
-        """Build worlds and networks; from a policy's, where there is one."""
+    def __init__(self, job: Job, start: Policy | None = None, *, resumes: bool = False) -> None:
+        """Build worlds and networks; from a policy's, where there is one.
+
+        `resumes` says that its training goes on, rather than that another one begins with it.
+        """
         self._job = job
-        self._done = 0 if start is None else decisions_of(start)
+        self._done = decisions_of(start) if start and resumes else 0
+        self._spreads = (_FIRST_SPREAD_FROM if start and not resumes else _SPREADS[0], _SPREADS[1])
         self._worlds, self._judges = (
             TrainingWorlds(job.character, job.settings, job.gains, threads=job.threads)
             for _ in range(2)
@@ -143,7 +156,8 @@ class Training:
         self._kept: Kept | None = None  # the best so far
         if start is not None:
             self._learner.take(start.network, start.value)
-            self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
+            if resumes:
+                self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
             self._look()
 
     def close(self) -> None:
@@ -170,7 +184,9 @@ class Training:
     def go_on(self) -> Progress:
         """Run episodes for a while, and learn from them."""
         share = min(self._done / self._job.decisions, 1.0)
-        spread, aim = (first * (last / first) ** share for first, last in (_SPREADS, _DIVERGENCES))
+        spread, aim = (
+            first * (last / first) ** share for first, last in (self._spreads, _DIVERGENCES)
+        )
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
         self._learner.learn(trace, noise, spread, aim)

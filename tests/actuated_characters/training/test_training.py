@@ -10,7 +10,7 @@ import pytest
 
 from actuated_characters.training import training as module
 from actuated_characters.training.episode_types import FELL
-from actuated_characters.training.training import Job, Training, check_start
+from actuated_characters.training.training import Job, Training, check_resumed, check_start
 from controller_node.planner.policy.file import Policy, read_policy
 from msgs_config.errors import ConfigurationError
 from tests.support.training import DECISIONS, HUMANOID, arrays_of, make_small, walking_job
@@ -27,8 +27,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 def begin() -> Iterator[Callable[..., Training]]:
     begun: list[Training] = []
 
-    def make(job: Job = JOB, start: Policy | None = None) -> Training:
-        begun.append(Training(job, start))
+    def make(job: Job = JOB, start: Policy | None = None, *, resumes: bool = False) -> Training:
+        begun.append(Training(job, start, resumes=resumes))
         return begun[-1]
 
     yield make
@@ -87,7 +87,7 @@ def test_a_training_that_is_resumed_goes_on_from_the_policy(
     about = {**policy.about, "trained": {**policy.about["trained"], "pushes_ns": 12.0}}
     policy = replace(policy, about=about)
 
-    resumed, afresh = begin(start=policy), begin()
+    resumed, afresh = begin(start=policy, resumes=True), begin()
     strengths = [[each.strength for each in one._worlds._episodes] for one in (resumed, afresh)]
     kept = resumed.best({})
     progress = resumed.go_on()
@@ -103,12 +103,44 @@ def test_a_training_that_is_resumed_goes_on_from_the_policy(
     assert strengths[0] != strengths[1], "the draws are those that it began with"
 
 
+def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., Training]) -> None:
+    walk = looked_at(begin()).best({})
+    walk = replace(walk, about={**walk.about, "trained": {"decisions": 50, "pushes_ns": 12.0}})
+    job = replace(JOB, names=("run",))
+    check_start(job, walk)
+
+    training = begin(job, walk)
+    first = training.best({})
+    progress = training.go_on()
+
+    for name, array in arrays_of(walk).items():
+        assert array.tobytes() == arrays_of(first)[name].tobytes()
+    assert progress.decisions == DECISIONS
+    assert progress.push == module._LEAST_PUSH
+    assert first.about["clips"] == ["run"]
+    assert first.scales.frame_mean.tobytes() == walk.scales.frame_mean.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"rate": 120}, "rate: 120, this training's: 240"),
+        ({"hold": 4}, "hold: 4, this training's: 8"),
+    ],
+)
+def test_it_begins_with_what_decides_alike(
+    begin: Callable[..., Training], change: dict[str, object], says: str
+) -> None:
+    policy = looked_at(begin()).best({})
+
+    with pytest.raises(ConfigurationError, match=says):
+        check_start(JOB, replace(policy, about={**policy.about, **change}))
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
         ({"clips": ["run"]}, "clips: run, this training's: walk"),
-        ({"rate": 120}, "rate: 120, this training's: 240"),
-        ({"hold": 4}, "hold: 4, this training's: 8"),
         ({"trained": {"decisions": 10**9}}, "1,000,000,000 decisions"),
     ],
 )
@@ -116,10 +148,10 @@ def test_it_goes_on_with_the_same_and_with_more(
     begin: Callable[..., Training], change: dict[str, object], says: str
 ) -> None:
     policy = looked_at(begin()).best({})
-    check_start(JOB, policy)
+    check_resumed(JOB, policy)
 
     with pytest.raises(ConfigurationError, match=says):
-        check_start(JOB, replace(policy, about={**policy.about, **change}))
+        check_resumed(JOB, replace(policy, about={**policy.about, **change}))
 
 
 def test_networks_of_another_size_are_refused(
