@@ -110,8 +110,8 @@ def check_start(job: Job, start: Policy) -> None:
             )
     for name, given, own in (
         ("sigma", start.unit, action_unit(job.settings)),
-        ("stiffness", start.stiffness, job.gains.stiffness),
-        ("damping", start.damping, job.gains.damping),
+        ("stiffness", start.stiffness[6:], job.gains.stiffness[6:]),  # no force acts on the root
+        ("damping", start.damping[6:], job.gains.damping[6:]),
     ):
         if not np.array_equal(given, own):
             raise ConfigurationError(

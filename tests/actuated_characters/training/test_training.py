@@ -11,7 +11,7 @@ import pytest
 from actuated_characters.training import training as module
 from actuated_characters.training.episode_types import FELL
 from actuated_characters.training.training import Job, Training, check_resumed, check_start
-from controller_node.planner.policy.file import Policy, read_policy
+from controller_node.planner.policy.file import Policy, read_policy, shipped_policies
 from msgs_config.errors import ConfigurationError
 from tests.support.training import DECISIONS, HUMANOID, arrays_of, make_small, walking_job
 
@@ -119,6 +119,11 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     assert progress.push == module._LEAST_PUSH
     assert first.about["clips"] == ["run"]
     assert first.scales.frame_mean.tobytes() == walk.scales.frame_mean.tobytes()
+
+
+@pytest.mark.parametrize("name", shipped_policies())
+def test_a_shipped_policy_is_where_a_training_may_begin(name: str) -> None:
+    check_start(JOB, read_policy(name, HUMANOID))
 
 
 @pytest.mark.parametrize(
