@@ -1,0 +1,36 @@
+"""Where a policy is used otherwise than it was trained, the user is told; else not."""
+
+import pytest
+
+from actuated_characters.runs.plan import make_plan
+from controller_node.planner.policy.file import shipped_policies
+
+SAYS = "the policy was trained with other {}: it may fall where it did not"
+
+
+def warnings(clip: str, planner: str = "policy", **controller: object) -> tuple[str, ...]:
+    motion = {"reference": "clip", "clip": clip}
+    return make_plan("humanoid", 1.0, motion, {}, {"planner": planner, **controller}).warnings
+
+
+@pytest.mark.parametrize("planner", ["policy", "hybrid"])
+@pytest.mark.parametrize("name", [name for name in shipped_policies() if name != "steered"])
+def test_a_shipped_policy_is_used_as_it_was_trained(name: str, planner: str) -> None:
+    assert warnings(name, planner) == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "others"),
+    [
+        ({"gain_scale.p": 0.9}, "stiffness"),
+        ({"gain_scale.d": 0.9}, "damping"),
+        ({"gravity": 1.62}, "gravity"),
+        ({"gain_scale.p": 0.9, "gravity": 1.62}, "stiffness, gravity"),
+    ],
+)
+def test_what_is_another_is_named(given: dict[str, object], others: str) -> None:
+    assert warnings("walk", **given) == (SAYS.format(others),)
+
+
+def test_of_plans_nothing_is_said() -> None:
+    assert warnings("walk", "predictive", gravity=1.62) == ()
