@@ -9,9 +9,11 @@ import numpy as np
 
 from actuated_characters.metrics.error_measures import joint_errors
 from actuated_characters.runs.planned.throws import plan_throws
+from actuated_characters.training.exercises import random_drive
 from benchmarks.tables.case import Case, Fact
 from benchmarks.tables.many import Options, RunTable
 from benchmarks.tables.seen import Seen
+from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.arrays import FloatArray
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import available_clips, read_clip
@@ -168,13 +170,21 @@ def measure_push(seen: Seen) -> dict[str, Fact]:
 
 
 def course_cases(kind: str, options: Options) -> Iterator[Case]:
-    """A figure of eight, walked and then run, that ends in a stop; or a stop from running."""
-    seconds, commands, since = (60.0, EIGHT, 50.4) if kind == "eight" else (10.0, STOP, 5.5)
+    """A figure of eight, walked and then run, that ends in a stop; a stop from running; moods."""
+    seconds, commands, since = {
+        "eight": (60.0, EIGHT, 50.4),
+        "stop": (10.0, STOP, 5.5),
+        "moods": (60.0, "", 0.0),
+    }[kind]
     for seed in options.seeds(5):
-        steered = {"reference": "steered"}
         yield Case(
-            kind, seconds, steered, controller=planner(seed), commands=commands, since=since
-        )  # fmt: skip
+            kind,
+            seconds,
+            {"reference": "steered"},
+            controller=planner(seed),
+            commands=commands or random_drive(SteeringLimits(), seconds, 100 + seed),
+            since=since,
+        )
 
 
 def measure_course(seen: Seen) -> dict[str, Fact]:
@@ -215,6 +225,6 @@ TABLES: Mapping[str, RunTable] = {
         "what the planner does not know of", [*PUSH_KINDS], push_cases, measure_push
     ),
     "courses": RunTable(
-        "commanded courses, planned", ["eight", "stop"], course_cases, measure_course
+        "commanded courses, planned", ["eight", "stop", "moods"], course_cases, measure_course
     ),
 }
