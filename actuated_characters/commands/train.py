@@ -366,4 +366,4 @@ def _say_how_to_play(options: argparse.Namespace, exercise: "Exercise", output: 
         words += ["--character", options.character]
     for text in (f"controller_node.policy:={output}", *options.set):
         words += ["--set", text]
-    Console().print("play it:", shlex.join(words), soft_wrap=True, markup=False)
+    print("play it:", shlex.join(words))
