@@ -27,7 +27,6 @@ from actuated_characters.commands.common.settings import (
     add_command,
     add_inputs,
     add_repeated,
-    bring_parameters,
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_table
@@ -162,6 +161,7 @@ class PlannedRun:
 
 def planned_run(options: argparse.Namespace) -> PlannedRun:
     """Plan the run that the options describe; raises ActuatedCharactersError if it cannot be."""
+    from actuated_characters.runs.brought import bring_parameters
     from actuated_characters.runs.plan import make_plan
     from actuated_characters.runs.planned.throws import plan_throws
     from actuated_characters.runs.planned.velocities import plan_velocities

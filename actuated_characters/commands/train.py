@@ -18,7 +18,6 @@ from actuated_characters.commands.common.settings import (
     Commands,
     add_character,
     add_command,
-    bring_parameters,
     node_settings,
 )
 from actuated_characters.commands.common.tables import make_facts_table
@@ -50,7 +49,7 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         "Train a small network that answers each state with offsets to a motion's angles, as a "
         "planner does, by trying in many worlds at once (proximal policy optimisation). Ctrl-C "
         "ends it and keeps the best so far. Play the result with `run --clip CLIP --planner policy "
-        "--set controller_node.policy:=FILE`.",
+        "--set controller_node.policy:=FILE`; the last lines say how.",
         [
             "train --clip walk --minutes 10",
             "train --clip walk --pushes 60 --output walk.npz",
@@ -115,9 +114,12 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def _train(options: argparse.Namespace) -> None:
-    from actuated_characters.training.exercises import STEERED, Exercise
+    from actuated_characters.training.exercises import Exercise
+    from controller_node.planner.policy.file import STEERED
 
     clips = options.clip or ([] if options.steer else ["walk"])
+    if STEERED in [Path(clip).stem for clip in clips]:
+        raise ConfigurationError(f"--clip {STEERED}: a policy keeps that name for --steer")
     names = (*clips, STEERED) if options.steer else tuple(clips)
     exercises = tuple(Exercise(options.character, name) for name in names)
     output = _output(options, names)
@@ -140,7 +142,8 @@ def _train(options: argparse.Namespace) -> None:
     _report(training, output, trials, spent)
     if trials:
         _show(options, exercises[0], output)
-    _say_how_to_play(options, exercises[0], output)
+    for exercise in exercises:
+        _say_how_to_play(options, exercise, output)
 
 
 def _go_on(training: "Training", job: "Job", output: Path) -> float:
@@ -253,16 +256,11 @@ def _start(options: argparse.Namespace, job: "Job", output: Path) -> "Policy | N
 
 
 def _plan(exercise: "Exercise", given: dict[str, object], seed: int) -> "RunPlan":
-    """A planned run, with the parameters that a reconstructed clip was found with."""
+    """A planned run of it, as long as episodes may begin."""
     from controller_node.planner.settings import PREDICTIVE
-    from msgs_config.character.loading import load_character
 
-    simulator, controller = dict[str, object](), dict(given)
-    if not exercise.is_steered:
-        character = load_character(exercise.character)
-        bring_parameters(character, exercise.name, simulator, controller)
-    controller |= {"planner": PREDICTIVE, "plan.workers": 1}
-    return exercise.plan(exercise.cycle_s, simulator, controller, seed)[0]
+    controller = given | {"planner": PREDICTIVE, "plan.workers": 1}
+    return exercise.plan(exercise.cycle_s, {}, controller, seed)[0]
 
 
 def _tracked(plan: "RunPlan", settings: "ControllerSettings") -> "TrackedReference":
@@ -284,7 +282,7 @@ def _given(options: argparse.Namespace) -> dict[str, object]:
         if name in ("planner", "policy"):
             reason = "it is what `train` makes"
         elif name in ("behaviour", "reference", "clip"):
-            reason = "`train` has the behaviour tracking, and clips of --clip"
+            reason = "`train` has the behaviour tracking, and clips of --clip or --steer"
         elif name.startswith("plan.") and not name.startswith(_USED):
             reason = f"training searches no plans; it takes {', '.join(_USED)} alone of plan.*"
         else:
@@ -318,14 +316,17 @@ def _show(options: argparse.Namespace, exercise: "Exercise", output: Path) -> No
     from actuated_characters.training.exhibition import keep_run
 
     controller = {**_given(options), "planner": "policy", "policy": str(output)}
-    directory = output.with_suffix("").absolute()
+    directory = output.with_name(f"{output.stem}-played").absolute()
+    overwrite = options.overwrite or options.resume
     try:
         with progress_bar("a run to look at", 1.0, transient=True) as bar:
 
             def progress(share: float) -> None:
                 bar.update(bar.task_ids[0], completed=share)
 
-            for path in keep_run(exercise, controller, directory, options.seed + 1, progress):
+            for path in keep_run(
+                *(exercise, controller, directory, progress), seed=1, overwrite=overwrite
+            ):
                 print(path)
     except KeyboardInterrupt:
         _say(f"interrupted; the run in {directory} is not complete")
@@ -361,7 +362,8 @@ def _report(
 
 
 def _say_how_to_play(options: argparse.Namespace, exercise: "Exercise", output: Path) -> None:
-    words = ["actuated_characters", "run", *exercise.options, "--planner", "policy"]
+    words = ["actuated_characters", "run", *exercise.options(_given(options))]
+    words += ["--planner", "policy"]
     if options.character != CHARACTER:
         words += ["--character", options.character]
     for text in (f"controller_node.policy:={output}", *options.set):

@@ -91,9 +91,9 @@ def metadata(policy: Policy, character: Character) -> dict[str, str]:
     have one.
     """
     layout, about, rate = character.layout, policy.about, policy.rate_hz
-    joints = layout.size - 6
-    ends = (policy.scales.frame_mean.shape[1] - FeatureLayout(joints, 0).frame_size) // 3
-    features = FeatureLayout(joints, ends)
+    parents = {link.parent for link in character.links}
+    ends = [link.name for row, link in enumerate(character.links) if row not in parents]
+    features = FeatureLayout(layout.size - 6, len(ends))
     parts = [(f"{name}_error", size) for name, size in zip(_FEATURES, features.sizes, strict=True)]
     for ticks in policy.ahead.tolist():
         parts += [
@@ -108,6 +108,7 @@ def metadata(policy: Policy, character: Character) -> dict[str, str]:
         "command_names": ["motion"],
         "observation_names": [name for name, _ in parts],
         "observation_dims": [size for _, size in parts],
+        "end_effector_names": ends,
         "action_scale": policy.unit.tolist(),
         "character": [about["character"]],
         "clips": about["clips"],

@@ -16,6 +16,7 @@ from msgs_config.errors import SimulationError
 
 _JOLT_NS = 5.0  # N s, from another side in each run, so that they differ
 _JOLT_AT, _JOLT_LASTS = 0.3, 0.2  # s
+_OTHER_DRIVES = 1_000_000  # seeds from which on no training has drives
 _LOOK = 8  # ticks from one look at the errors to the next
 
 
@@ -39,7 +40,7 @@ def attempt(
     """
     seconds, simulator = exercise.tried_s, {"engine": engine, "wrench_duration": _JOLT_LASTS}
     controller = {**given, "planner": "policy", "policy": str(policy)}
-    plan, _ = exercise.plan(seconds, simulator, controller, seed)
+    plan, _ = exercise.plan(seconds, simulator, controller, _OTHER_DRIVES + seed)
     side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
     force = _JOLT_NS / _JOLT_LASTS
     root = plan.character.links[0].name

@@ -1,24 +1,29 @@
 """What a policy is to keep: a clip, or where a driver of all moods steers."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from actuated_characters.runs.brought import bring_parameters
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
+from controller_node.planner.policy.file import STEERED
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import ClipFrames, read_clip
 
-STEERED = "steered"
 _DRIVEN_S = 240.0  # of a drive in which episodes begin
 _TRIED_S = 60.0  # of the last runs of what does not end
+_STEADY = 1.0  # m/s
 _MOOD_S = (1.0, 4.0)  # least and most time for which a driver wants the same
 _STOPS, _MANOEUVRES, _BENDS = 0.15, 0.15, 0.5  # shares of moods; of what goes ahead, of bends
 _SHARPEST = 1.5  # m/s^2 to the side, that a driver wants
+_SHORTEST = 0.1  # s, that a mood lasts at the end
+_DIGITS = 1e3  # a velocity's and a time's, rounded to zero, so that none is beyond its limit
 
 
 @dataclass(frozen=True)
@@ -48,12 +53,13 @@ class Exercise:
         """Length of a run that tries it."""
         return _TRIED_S if self.is_steered or self.wraps else self.cycle_s
 
-    @property
-    def options(self) -> list[str]:
-        """Of `run`, so that it plays it."""
-        if self.is_steered:
-            return ["--cmd-vel", "1,0,0@0"]
-        return ["--clip", self.name]
+    def options(self, controller: Mapping[str, object]) -> list[str]:
+        """Of `run`, so that it plays it; `controller` has the controller's parameters."""
+        if not self.is_steered:
+            return ["--clip", self.name]
+        reference = self.plan(1.0, {}, controller, 0)[0].reference
+        assert isinstance(reference, SteeredReference)
+        return ["--cmd-vel", f"{min(_STEADY, reference.limits.speed):g},0,0@0"]
 
     def plan(
         self,
@@ -64,17 +70,21 @@ class Exercise:
     ) -> tuple[RunPlan, list[PlannedVelocity]]:
         """A run of it, and the velocities to send; `seed` says where it is steered.
 
+        A reconstructed clip brings the parameters that it was found with. How long a command holds
+        does not matter to a drive, which gives each once.
+
         Raises:
             ActuatedCharactersError: a name or a value is wrong.
         """
-        motion = {"reference": STEERED}
         if not self.is_steered:
+            simulator, controller = dict(simulator), dict(controller)
+            bring_parameters(load_character(self.character), self.name, simulator, controller)
             motion = {"reference": "clip", "clip": self.name}
-        plan = make_plan(self.character, seconds, motion, simulator, controller)
-        if not isinstance(plan.reference, SteeredReference):
-            return plan, []
-        drive = random_drive(plan.reference.limits, seconds, seed)
-        return plan_velocities(plan, drive)
+            return make_plan(self.character, seconds, motion, simulator, controller), []
+        lasting = {**controller, "steering.timeout": seconds}
+        plan = make_plan(self.character, seconds, {"reference": STEERED}, simulator, lasting)
+        assert isinstance(plan.reference, SteeredReference)
+        return plan_velocities(plan, random_drive(plan.reference.limits, seconds, seed))
 
     @cached_property
     def _frames(self) -> ClipFrames:
@@ -86,7 +96,7 @@ def random_drive(limits: SteeringLimits, seconds: float, seed: int) -> str:
     rng, time, drive = np.random.default_rng((seed, 7)), 0.0, list[str]()
     ahead = min(limits.region.ahead, limits.speed)
     back, aside = (min(each, limits.speed) for each in (limits.region.back, limits.region.aside))
-    while time < seconds:
+    while time == 0.0 or time < seconds - _SHORTEST:
         mood, velocity = rng.random(), (0.0, 0.0, 0.0)
         if mood > 1.0 - _MANOEUVRES:
             velocity = rng.uniform(-back, back), rng.uniform(-aside, aside), 0.0
@@ -94,6 +104,7 @@ def random_drive(limits: SteeringLimits, seconds: float, seed: int) -> str:
             speed = rng.uniform(0.0, ahead)
             most = min(limits.turn_rate, limits.region.turn, _SHARPEST / max(speed, 1e-3))
             velocity = speed, 0.0, rng.uniform(-most, most) * (rng.random() < _BENDS)
-        drive.append(",".join(f"{each:.2f}" for each in velocity) + f"@{time:.2f}")
+        rounded = [math.trunc(each * _DIGITS) / _DIGITS for each in (*velocity, time)]
+        drive.append("{:g},{:g},{:g}@{:g}".format(*rounded))
         time += rng.uniform(*_MOOD_S)
     return " ".join(drive)

@@ -21,23 +21,26 @@ def keep_run(
     exercise: Exercise,
     controller: Mapping[str, object],
     directory: Path,
-    seed: int,
     progress: Callable[[float], None],
+    *,
+    seed: int,
+    overwrite: bool,
 ) -> list[Path]:
     """Run an exercise into a directory; returns its pictures, and a film where PyAV is installed.
 
     Args:
         exercise: What is played, for ten seconds at the most.
         controller: Parameters of the controller.
-        directory: The run's, whose results are replaced.
-        seed: Says where it is steered.
+        directory: The run's.
         progress: Is called with the share that is done, 0 to 1.
+        seed: Says where it is steered.
+        overwrite: Whether another run's results may be replaced.
 
     Raises:
         ActuatedCharactersError: it cannot be run, or written.
     """
     plan, velocities = exercise.plan(min(exercise.tried_s, _LONGEST_S), {}, controller, seed)
-    prepare_directory(directory, overwrite=True)
+    prepare_directory(directory, overwrite=overwrite)
     run_in_process(
         plan,
         directory,

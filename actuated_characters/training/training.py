@@ -129,7 +129,13 @@ class Training:
         """
         self._job = job
         self._done = decisions_of(start) if start and resumes else 0
-        self._spreads = (_FIRST_SPREAD_FROM if start and not resumes else _SPREADS[0], _SPREADS[1])
+        self._first_spread, self._from = _SPREADS[0], None
+        if start is not None and resumes:
+            self._from = start.about["trained"].get("from")
+        elif start is not None:
+            self._from = {"clips": start.about["clips"], "decisions": decisions_of(start)}
+        if self._from is not None:
+            self._first_spread = _FIRST_SPREAD_FROM
         self._worlds, self._judges = (
             TrainingWorlds(job.character, job.settings, job.gains, threads=job.threads)
             for _ in range(2)
@@ -156,8 +162,8 @@ class Training:
         self._kept: Kept | None = None  # the best so far
         if start is not None:
             self._learner.take(start.network, start.value)
-            if resumes:
-                self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
+        if start is not None and resumes:
+            self._push = float(start.about["trained"].get("pushes_ns", _LEAST_PUSH))
             self._look()
 
     def close(self) -> None:
@@ -184,9 +190,8 @@ class Training:
     def go_on(self) -> Progress:
         """Run episodes for a while, and learn from them."""
         share = min(self._done / self._job.decisions, 1.0)
-        spread, aim = (
-            first * (last / first) ** share for first, last in (self._spreads, _DIVERGENCES)
-        )
+        spreads = self._first_spread, _SPREADS[1]
+        spread, aim = (first * (last / first) ** share for first, last in (spreads, _DIVERGENCES))
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
         self._learner.learn(trace, noise, spread, aim)
@@ -258,6 +263,7 @@ class Training:
             "decisions": self._done,
             "seed": job.seed,
             "pushes_ns": round(min(self._push, job.most_push), 1),
+            **({} if self._from is None else {"from": self._from}),
         }
         policy, value = (
             Network(*(each.copy() for each in network))

@@ -175,7 +175,10 @@ def test_an_engine_gives_its_number_until_it_is_closed() -> None:
         first.close()
         with pytest.raises(ClosedError, match="closed"):
             pybullet.stepSimulation(physicsClientId=first)
-        assert pybullet.isConnected(third)
+        with pytest.raises(ClosedError, match="closed"), first.alone():
+            pass
+        with third.alone():
+            assert pybullet.isConnected(third)
     second.close()
 
 

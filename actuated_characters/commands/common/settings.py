@@ -12,7 +12,6 @@ from msgs_config.errors import ConfigurationError, one_of
 if TYPE_CHECKING:  # it takes a while to import
     from actuated_characters.bags.recording import Recording
     from actuated_characters.bags.robots.reading import RobotSource
-    from controller_node.references.files.reconstructed import FoundWith
     from msgs_config.character.model import Character
     from msgs_config.parameters import Parameter
 
@@ -120,35 +119,6 @@ def node_settings(texts: Sequence[str], nodes: Sequence[str]) -> dict[str, dict[
             raise ConfigurationError(f"--set {text}: {one_of('node', node, list(nodes))}")
         settings[node][parameter] = files.parse_yaml(f"--set {text}", value, ConfigurationError)
     return settings
-
-
-def bring_parameters(
-    character: "Character",
-    clip: str | None,
-    simulator: dict[str, object],
-    controller: dict[str, object],
-) -> "FoundWith | None":
-    """Set what a reconstructed clip was found with, unless it is set.
-
-    Returns all that it was found with, None of other clips.
-
-    Raises:
-        ActuatedCharactersError: there is no such clip, or its file is malformed.
-    """
-    from actuated_characters.runs.plan import SHARED
-    from controller_node.references.files.reconstructed import SUFFIX, ReconstructedClip
-
-    if clip is None or not clip.endswith(SUFFIX):
-        return None
-    found = ReconstructedClip(character, clip).found_with
-    if found is None:
-        return None
-    taken = {name for name in SHARED if name in simulator or name in controller}
-    for settings, brought in ((simulator, found.simulator), (controller, found.controller)):
-        settings.update(
-            {name: brought[name] for name in brought if name not in (*settings, *taken)}
-        )
-    return found
 
 
 def parameters_of(node: str, character: "Character") -> "list[Parameter]":

@@ -28,6 +28,8 @@ from msgs_config.whole_files import write_whole
 
 SHIPPED = Path(__file__).parent / "shipped"
 SUFFIX = ".npz"
+STEERED = "steered"
+"""The name among `clips` of what is steered; also that of its reference."""
 _FORMAT = 1
 _LARGEST_ARRAY = 80_000_000  # bytes
 _ABOUT: Mapping[str, tuple[type | tuple[type, ...], str]] = {

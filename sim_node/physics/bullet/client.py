@@ -5,6 +5,7 @@ kept and shown only with the error that it explains. It reads numbers by the C l
 which therefore is "C" wherever it reads a file.
 """
 
+import operator
 import tempfile
 import weakref
 from collections.abc import Iterator
@@ -67,9 +68,10 @@ class Engine:
             ClosedError: it is closed.
         """
         with Engine._turns:
+            number = operator.index(self)
             if Engine._threshold_in_force != self._breaking_threshold:
                 pybullet.setPhysicsEngineParameter(
-                    contactBreakingThreshold=self._breaking_threshold, physicsClientId=self
+                    contactBreakingThreshold=self._breaking_threshold, physicsClientId=number
                 )
                 Engine._threshold_in_force = self._breaking_threshold
             yield

@@ -54,25 +54,42 @@ def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert main([*words, "--in-process", "--duration", "0.3", "--output", "run"]) == 0
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert not summary["fell"]
-    shown = Path("policies/humanoid-walk")
+    shown = Path("policies/humanoid-walk-played")
     for name in ("bag", "summary.json", "strip.png", "video.mp4"):
         assert (shown / name).exists()
         assert name in ("bag", "summary.json") or str(shown / name) in said
+
+
+def test_another_runs_results_are_replaced_where_files_may_be(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(acceptance, "attempt", no_trials)
+    given = ["train", *FEW, "--output", "walk.npz"]
+    plot = tmp_path / "walk-played" / "plot.png"
+    plot.parent.mkdir()
+    plot.write_text("another's")
+
+    assert main(given) == 0
+    assert "holds results already" in capsys.readouterr().err
+    assert plot.read_text() == "another's"
+    assert main([*given, "--overwrite"]) == 0
+    assert "no run to look at" not in capsys.readouterr().err
+    assert plot.read_bytes().startswith(b"\x89PNG")
 
 
 def test_files_where_its_run_would_go_are_left_alone(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr(acceptance, "attempt", no_trials)
-    (tmp_path / "walk").mkdir()
-    (tmp_path / "walk" / "mine.txt").write_text("mine")
+    (tmp_path / "walk-played").mkdir()
+    (tmp_path / "walk-played" / "mine.txt").write_text("mine")
 
     assert main(["train", *FEW, "--output", "walk.npz"]) == 0
 
     said = capsys.readouterr()
     assert "no run to look at: " in said.err and "holds other files" in said.err
     assert "play it:" in said.out
-    assert [path.name for path in (tmp_path / "walk").iterdir()] == ["mine.txt"]
+    assert [path.name for path in (tmp_path / "walk-played").iterdir()] == ["mine.txt"]
     read_policy("walk.npz", HUMANOID)
 
 
@@ -122,6 +139,7 @@ def _options(arguments: Sequence[str]) -> object:
         (["--seed", "-1"], "--seed is -1; it must be 0 or more"),
         (["--threads", "0"], "--threads is 0; it must be 1 or more"),
         (["--clip", "wlak"], "wlak"),
+        (["--clip", "a/steered.json"], "--clip steered: a policy keeps that name for --steer"),
         (["--character", "humanoit"], "humanoit"),
         (["--character", "pendulum"], "pendulum"),
         (["--character", str(DATA / "free_box.yaml")], "free_box"),

@@ -73,6 +73,9 @@ def test_its_metadata_say_how_to_run_it(file: Path) -> None:
         ("action_scale", policy.unit),
     ):
         assert [float(each) for each in said[name]] == list(wanted)
+    assert set(said["end_effector_names"]) == {
+        *("left_wrist", "right_wrist", "left_ankle", "right_ankle", "neck"),
+    }
     assert len(said["observation_names"]) == len(set(said["observation_names"]))
     dims = [int(each) for each in said["observation_dims"]]
     assert len(dims) == len(said["observation_names"])

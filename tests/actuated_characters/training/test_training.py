@@ -110,7 +110,8 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     check_start(job, walk)
 
     training = begin(job, walk)
-    first = training.best({})
+    assert not training.has_best  # nothing of its own yet, that could replace a file
+    first = looked_at(training).best({})
     progress = training.go_on()
 
     for name, array in arrays_of(walk).items():
@@ -118,6 +119,10 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     assert progress.decisions == DECISIONS
     assert progress.push == module._LEAST_PUSH
     assert first.about["clips"] == ["run"]
+    assert first.about["trained"]["from"] == {"clips": ["walk"], "decisions": 50}
+    again = looked_at(begin(replace(job, decisions=10**6), first, resumes=True))
+    assert again.best({}).about["trained"]["from"] == {"clips": ["walk"], "decisions": 50}
+    assert again._first_spread == training._first_spread < begin()._first_spread
     assert first.scales.frame_mean.tobytes() == walk.scales.frame_mean.tobytes()
 
 

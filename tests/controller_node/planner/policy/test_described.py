@@ -14,7 +14,7 @@ def warnings(clip: str, planner: str = "policy", **controller: object) -> tuple[
 
 
 @pytest.mark.parametrize("planner", ["policy", "hybrid"])
-@pytest.mark.parametrize("name", [name for name in shipped_policies() if name != "steered"])
+@pytest.mark.parametrize("name", shipped_policies())
 def test_a_shipped_policy_is_used_as_it_was_trained(name: str, planner: str) -> None:
     assert warnings(name, planner) == ()
 
