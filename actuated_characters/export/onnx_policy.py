@@ -91,8 +91,7 @@ def metadata(policy: Policy, character: Character) -> dict[str, str]:
     have one.
     """
     layout, about, rate = character.layout, policy.about, policy.rate_hz
-    parents = {link.parent for link in character.links}
-    ends = [link.name for row, link in enumerate(character.links) if row not in parents]
+    ends = [character.links[index].name for index in character.end_effectors]
     features = FeatureLayout(layout.size - 6, len(ends))
     parts = [(f"{name}_error", size) for name, size in zip(_FEATURES, features.sizes, strict=True)]
     for ticks in policy.ahead.tolist():

@@ -68,11 +68,6 @@ class ContactModel:
         self._data: list[mujoco.MjData] = []
         self._identity = np.zeros(self._model.nq)
         self._identity[quaternion_starts(self._model)] = 1.0
-        parents = {link.parent for link in character.links}
-        self.end_effectors = [
-            index for index in range(len(character.links)) if index not in parents
-        ]
-        """Links that carry no other, as indices of `Character.links`."""
         self.left = _left_axis(character)
         """The root's axis (3,), in its frame, that points to the left while it stands."""
         self._tree = Tree(
@@ -103,7 +98,7 @@ class ContactModel:
     @property
     def feature_layout(self) -> FeatureLayout:
         """Where the parts of features are."""
-        return FeatureLayout(self._character.layout.size - 6, len(self.end_effectors))
+        return FeatureLayout(self._character.layout.size - 6, len(self._character.end_effectors))
 
     @property
     def feature_count(self) -> int:
@@ -135,7 +130,9 @@ class ContactModel:
             layout.vector_starts,
             layout.vector_lengths,
         )
-        watched = Watched(np.array(self.end_effectors, dtype=np.intp) + 1, self._character.mass)
+        watched = Watched(
+            np.array(self._character.end_effectors, dtype=np.intp) + 1, self._character.mass
+        )
         own = self._has_own_contacts
         return RolloutModel(self._tree, self._joints, self._limits, law, watched, own)
 

@@ -104,17 +104,17 @@ def _read_policy(character: Character, values: Values) -> "Policy":
     from controller_node.planner.policy.file import STEERED, read_policy, shipped_policies
 
     given, reference = PlannerParameters.of(values), MotionSettings.of(values).reference
-    clip = ClipSettings.of(values).clip if reference == "clip" else ""
-    motion = Path(clip).stem or (STEERED if reference == STEERED else "")
-    name = given.policy or (clip or motion if (clip or motion) in shipped_policies() else "")
+    motion = ClipSettings.of(values).clip if reference == "clip" else reference
+    name = given.policy or (motion if motion in shipped_policies() else "")
     policy = read_policy(name, character)
     if policy.rate_hz != given.rate_hz:
         raise ConfigurationError(
             f"parameter 'rate' is {given.rate_hz}; the policy '{name}' is for {policy.rate_hz}"
         )
     trained = policy.about["clips"]
-    if not motion or motion not in [Path(each).stem for each in trained]:
-        tracked = f"the clip is {clip}" if clip else f"'reference' is {reference}"
+    is_known = Path(motion).stem in [Path(each).stem for each in trained]
+    if reference not in ("clip", STEERED) or not is_known:
+        tracked = f"the clip is {motion}" if reference == "clip" else f"'reference' is {reference}"
         raise ConfigurationError(
             f"the policy '{name}' was trained on {', '.join(trained)}; {tracked}"
         )

@@ -275,6 +275,12 @@ class Character:
         joints = self.moving_joints
         return Coupling(self.layout, {j.name: j.mimic for j in joints if j.mimic is not None})
 
+    @cached_property
+    def end_effectors(self) -> tuple[int, ...]:
+        """Links that carry no other, as indices of `links`."""
+        parents = {link.parent for link in self.links}
+        return tuple(index for index in range(len(self.links)) if index not in parents)
+
     @property
     def leaders(self) -> dict[str, str]:
         """The leader of each joint that mimics one, by the follower's name."""

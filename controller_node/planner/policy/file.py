@@ -194,9 +194,7 @@ def _read_about(content: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _layout(character: Character) -> FeatureLayout:
     """That of `ContactModel.feature_layout`, without building the model."""
-    parents = {link.parent for link in character.links}
-    ends = len(set(range(len(character.links))) - parents)
-    return FeatureLayout(character.layout.size - 6, ends)
+    return FeatureLayout(character.layout.size - 6, len(character.end_effectors))
 
 
 def _found(content: Mapping[str, Any], name: str) -> Any:

@@ -26,7 +26,9 @@ class ResidualModel:
         self, character: Character, model: ContactModel, settings: PlannerSettings
     ) -> None:
         layout, weights = model.feature_layout, settings.parameters.weights
-        is_foot = [character.links[index].name in character.feet for index in model.end_effectors]
+        is_foot = [
+            character.links[index].name in character.feet for index in character.end_effectors
+        ]
         parts = [
             weights.root_rotation,
             weights.joints,

@@ -127,8 +127,16 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
 
 
 @pytest.mark.parametrize("name", shipped_policies())
-def test_a_shipped_policy_is_where_a_training_may_begin(name: str) -> None:
-    check_start(JOB, read_policy(name, HUMANOID))
+def test_a_shipped_policy_is_where_a_training_may_begin(
+    begin: Callable[..., Training], name: str
+) -> None:
+    policy = read_policy(name, HUMANOID)
+    check_start(JOB, policy)
+
+    learner = begin(JOB, policy)._learner
+
+    for own, given in zip(learner.policy, policy.network, strict=True):
+        np.testing.assert_array_equal(own, given)
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ def independent_features(
         inertia = turn @ np.diag(link.inertia_diagonal) @ turn.T
         spin += link.mass * np.cross(data.xipos[index + 1] - centre, moving[:3] - speed)
         spin += inertia @ moving[3:]
-    ends = data.xpos[np.array(MODEL.end_effectors) + 1].ravel()
+    ends = data.xpos[np.array(HUMANOID.end_effectors) + 1].ravel()
     return np.concatenate((error[3:], velocity[3:], centre, speed, spin, ends))
 
 

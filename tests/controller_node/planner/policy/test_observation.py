@@ -30,7 +30,7 @@ NOTHING = np.zeros(N)
 BODY = MODEL.body(GainArrays(NOTHING, NOTHING, NOTHING, HUMANOID.effort_limits()))
 ENGINE = MODEL.engine()
 CENTRE = 2 * N - 6
-FRAME = FRAME_VECTORS + 3 * len(MODEL.end_effectors) + N - 6
+FRAME = FRAME_VECTORS + 3 * len(HUMANOID.end_effectors) + N - 6
 FRAMES = 3
 PLAIN = ObservationScales(
     np.ones(MODEL.feature_count), np.zeros((FRAMES, FRAME)), np.ones((FRAMES, FRAME)), CENTRE
