@@ -61,7 +61,8 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--clip",
         action="append",
         metavar="NAME",
-        help="name of a clip, or a file; may be repeated: one policy for all of them (walk)",
+        help="name of a clip, a file, or a folder of files; may be repeated: one policy for all of "
+        "them (walk)",
     )
     command.add_argument(
         "--steer",
@@ -116,8 +117,11 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
 def _train(options: argparse.Namespace) -> None:
     from actuated_characters.training.exercises import Exercise
     from controller_node.planner.policy.file import STEERED
+    from msgs_config.character.loading import load_character
+    from msgs_config.clips.reading import expand_clips
 
-    clips = options.clip or ([] if options.steer else ["walk"])
+    asked = options.clip or ([] if options.steer else ["walk"])
+    clips = expand_clips(load_character(options.character), asked)
     if STEERED in [Path(clip).stem for clip in clips]:
         raise ConfigurationError(f"--clip {STEERED}: a policy keeps that name for --steer")
     names = (*clips, STEERED) if options.steer else tuple(clips)

@@ -68,6 +68,7 @@ def run_decisions(
     action = np.empty(len(rules.unit), np.float32)
     _enter(episode, features, deviation, table, rules, world)
     for t in range(len(trace.rewards)):
+        trace.rows[t] = episode.counts[0]
         _tell(trace.observations[t], episode.counts[0], deviation, frames, table, rules)
         evaluate(network, trace.observations[t], action)
         for i in range(len(action)):

@@ -16,7 +16,7 @@ from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import ClipFrames, read_clip
 
-_DRIVEN_S = 240.0  # of a drive in which episodes begin
+_DRIVEN_S = 480.0  # of a drive in which episodes begin
 _TRIED_S = 60.0  # of the last runs of what does not end
 _STEADY = 1.0  # m/s
 _MOOD_S = (1.0, 4.0)  # least and most time for which a driver wants the same

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.training.episode_types import Table
+from actuated_characters.training.starts import Stretch
 from controller_node.planner.compiled.features import FeatureLayout
 from controller_node.planner.compiled.observation import (
     ObservationScales,
@@ -42,18 +43,17 @@ def frames_ahead(rate_hz: int) -> IntArray:
 
 def make_table(
     model: ContactModel, body: RolloutModel, references: Sequence[TrainedReference], rate_hz: int
-) -> tuple[Table, list[IntArray]]:
+) -> tuple[Table, list[Stretch]]:
     """References as one table, and of each the rows in which episodes may begin."""
     ahead = frames_ahead(rate_hz)
-    parts, starts, first = list[tuple[FloatArray, ...]](), list[IntArray](), 0
+    parts, starts, first = list[tuple[FloatArray, ...]](), list[Stretch](), 0
     for each in references:
         seconds = each.cycle_s + _AFTER_S
         if each.wraps:
             seconds = max(seconds, _WRAPPED_S)
         count = round(seconds * rate_hz) + int(ahead[-1]) + 2
         parts.append(_sample(model, body, each.reference, count))
-        begin = max(round(each.cycle_s * rate_hz), 1)
-        starts.append(np.arange(first, first + begin, dtype=np.intp))
+        starts.append(Stretch(first, max(round(each.cycle_s * rate_hz), 1), each.wraps))
         first += count
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     lasts = np.cumsum([len(part[0]) for part in parts]) - 1
@@ -81,13 +81,13 @@ def _sample(
 
 
 def make_scales(
-    table: Table, starts: Sequence[IntArray], layout: FeatureLayout
+    table: Table, starts: Sequence[Stretch], layout: FeatureLayout
 ) -> ObservationScales:
     """Scales of observations: fixed for deviations, of frames by how they vary."""
     centre, deviation = layout.centre, np.repeat(_DEVIATIONS, layout.sizes)
     shape = (len(table.ahead), table.frames.shape[1])
     plain = ObservationScales(deviation, np.zeros(shape), np.ones(shape), centre)
-    told = np.array([_told(table, int(row), plain) for row in np.concatenate(starts)])
+    told = np.array([_told(table, int(row), plain) for each in starts for row in each.rows])
     least = np.repeat(_LEAST_SPREADS, layout.frame_sizes)
     spread = _WIDE * np.maximum(told.std(axis=0), least)
     return ObservationScales(deviation, told.mean(axis=0), spread, centre)

@@ -195,6 +195,7 @@ class Training:
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
         self._learner.learn(trace, noise, spread, aim)
+        self._worlds.prefer_hard_starts(trace)
         self._done += trace.rewards.size
         self._lead_pushes(trace)
         is_due = self._done * _LOOKS >= (self._looked + 1) * self._job.decisions

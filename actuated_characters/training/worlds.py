@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuated_characters.training.episode_types import (
+    FELL,
     Draws,
     Episode,
     Rules,
@@ -13,6 +14,7 @@ from actuated_characters.training.episode_types import (
     World,
 )
 from actuated_characters.training.episodes import begin, run_decisions
+from actuated_characters.training.starts import Starts, Stretch
 from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.law import Room
 from controller_node.planner.compiled.network import Network
@@ -21,7 +23,7 @@ from controller_node.planner.compiled.rollout import MOST_BOUNDS, RolloutModel
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.search.cost import ResidualModel
 from controller_node.planner.settings import OWN_CONTACTS, WORLD_CONTACTS, PlannerSettings
-from msgs_config.arrays import FloatArray, IntArray, SingleArray
+from msgs_config.arrays import FloatArray, SingleArray
 from msgs_config.character.model import Character
 from msgs_config.compiled.soft_limits import room_for_bounds
 from msgs_config.runtime.worker_threads import WorkerThreads
@@ -87,7 +89,7 @@ class TrainingWorlds:
     def begin(
         self,
         table: Table,
-        starts: Sequence[IntArray],
+        starts: Sequence[Stretch],
         scales: ObservationScales,
         count: int,
         rng: np.random.Generator,
@@ -96,7 +98,8 @@ class TrainingWorlds:
 
         `rng` is of all that is random from now on.
         """
-        self._table, self._starts, self._rules = table, starts, self._make_rules(scales)
+        self._table, self._rules = table, self._make_rules(scales)
+        self._starts = Starts(starts, self._settings.parameters.rate_hz)
         self._rng = rng
         n = table.velocities.shape[1]
         self._episodes = [
@@ -110,7 +113,7 @@ class TrainingWorlds:
             )
             for strength in self._rng.uniform(*_STRENGTHS, count)
         ]
-        for episode, row in zip(self._episodes, self._draw_starts(count), strict=True):
+        for episode, row in zip(self._episodes, self._starts.draw(count, rng), strict=True):
             begin(episode, int(row), np.zeros(n), table, self.body.joints)
 
     @property
@@ -130,7 +133,7 @@ class TrainingWorlds:
         trace = self._make_trace(count, decisions)
         shape = (count, decisions)
         noise = rng.standard_normal((*shape, len(self._rules.unit)), np.float32)
-        starts = self._draw_starts(count * decisions).reshape(shape)
+        starts = self._starts.draw(count * decisions, rng).reshape(shape)
         off = rng.normal(size=(*shape, n)) * rng.random((*shape, 1))
         pushes = rng.random((*shape, 4))
 
@@ -151,6 +154,10 @@ class TrainingWorlds:
 
         self._threads.share(count, work)
         return trace, noise
+
+    def prefer_hard_starts(self, trace: Trace) -> None:
+        """Let more episodes begin shortly before the moments in which those of a trace fell."""
+        self._starts.learn(trace.rows, trace.ends == FELL)
 
     def _make_rules(self, scales: ObservationScales) -> Rules:
         settings, residuals = self._settings, self._residuals
@@ -178,17 +185,8 @@ class TrainingWorlds:
             np.zeros((count, decisions)),
             np.zeros((count, decisions), np.intp),
             np.zeros((count, decisions), np.intp),
+            np.zeros((count, decisions), np.intp),
         )
-
-    def _draw_starts(self, count: int) -> IntArray:
-        """Rows in which episodes begin: any reference, any moment of it."""
-        which = self._rng.integers(len(self._starts), size=count)
-        shares = self._rng.random(count)
-        rows = [
-            self._starts[each][int(share * len(self._starts[each]))]
-            for each, share in zip(which, shares, strict=True)
-        ]
-        return np.array(rows, dtype=np.intp)
 
 
 def _world(model: ContactModel, body: RolloutModel, size: int) -> World:

@@ -20,7 +20,7 @@ from msgs_config.clips.reading import available_clips, read_clip
 from msgs_config.geometry import rotations
 
 CYCLE = 1.27  # s, of the walk
-BALL = "mass=2.5 speed=8 target=chest at={:.4f} from={:.4f}"
+BALL_SPEED = 8.0  # m/s
 BALL_LIFETIME = 0.6  # s, of which it flies 0.2
 MISSED = 0.2  # m that a walk is beside its clip where a ball misses it
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
@@ -81,7 +81,7 @@ class PushKind:
     pushes: int = 1
     every: float = 2.0  # s
     lasts: float = 0.2  # s that each push lasts
-    balls: bool = False  # balls at the chest; the clip's heading is forwards
+    balls: bool = False  # balls at the chest, so heavy; the clip's heading is forwards
     stands: bool = False  # it stands instead of walking
     seconds: float = 8.5
     behaviour: str = "tracking"
@@ -89,6 +89,7 @@ class PushKind:
 
 PUSH_KINDS = {
     "none": PushKind(pushes=0, seconds=20.0),
+    "jolt": PushKind(5.0, seconds=60.0),
     "10 N s every 2 s": PushKind(10.0, pushes=9, lasts=0.1, seconds=20.0),
     "20 N s every 2 s": PushKind(20.0, pushes=9, lasts=0.1, seconds=20.0),
     "48 or 60 N s": PushKind(48.0, 60.0),
@@ -96,6 +97,8 @@ PUSH_KINDS = {
     "balls": PushKind(20.0, pushes=5, every=4.0, seconds=20.0, balls=True),
     "standing": PushKind(12.0, pushes=11, every=5.0, lasts=0.1, seconds=60.0, stands=True),
     "fall": PushKind(300.0, seconds=16.0, behaviour="active_ragdoll"),
+    "drags": PushKind(300.0, lasts=1.0, seconds=16.0, behaviour="active_ragdoll"),
+    "heavy balls": PushKind(120.0, balls=True, seconds=16.0, behaviour="active_ragdoll"),
     "any": PushKind(40.0, hardest=240.0, seconds=5.5),
 }
 
@@ -106,7 +109,7 @@ def push_cases(name: str, options: Options) -> Iterator[Case]:
     for seed in options.seeds(24):
         pushes = list(impulses(name, seed - 1))
         texts = [f"root:{x / kind.lasts!r},{y / kind.lasts!r},0@{time!r}" for time, x, y in pushes]
-        balls = [BALL.format(time, math.degrees(math.atan2(-y, -x))) for time, x, y in pushes]
+        balls = [_ball(*push) for push in pushes]
         yield Case(
             name,
             options.seconds or kind.seconds,
@@ -117,6 +120,12 @@ def push_cases(name: str, options: Options) -> Iterator[Case]:
             throws=balls if kind.balls else [],
             until_fall=kind.behaviour == "tracking",
         )
+
+
+def _ball(time: float, x: float, y: float) -> str:
+    """The throw of a ball of an impulse in N s that comes to the chest at a time in s."""
+    mass, side = math.hypot(x, y) / BALL_SPEED, math.degrees(math.atan2(-y, -x))
+    return f"mass={mass:.4g} speed={BALL_SPEED:g} target=chest at={time:.4f} from={side:.4f}"
 
 
 def impulses(name: str, number: int) -> Iterator[tuple[float, float, float]]:

@@ -5,6 +5,7 @@ import shlex
 import signal
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from actuated_characters.training.acceptance import Trial
 from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.training import Progress, Training
 from controller_node.planner.policy.file import read_policy
+from msgs_config.clips.reading import clip_path
 from tests.support.physics import DATA
 from tests.support.policies import write_random_policy
 from tests.support.training import HUMANOID, make_small
@@ -139,7 +141,8 @@ def _options(arguments: Sequence[str]) -> object:
         (["--seed", "-1"], "--seed is -1; it must be 0 or more"),
         (["--threads", "0"], "--threads is 0; it must be 1 or more"),
         (["--clip", "wlak"], "wlak"),
-        (["--clip", "a/steered.json"], "--clip steered: a policy keeps that name for --steer"),
+        (["--clip", "folder.npz"], "there is no .json or .txt file of motion in it"),
+        (["--clip", "steered.json"], "--clip steered: a policy keeps that name for --steer"),
         (["--character", "humanoit"], "humanoit"),
         (["--character", "pendulum"], "pendulum"),
         (["--character", str(DATA / "free_box.yaml")], "free_box"),
@@ -168,6 +171,7 @@ def test_a_mistake_is_one_line(
     (tmp_path / "folder.npz").mkdir()
     write_random_policy(tmp_path / "there.npz", HUMANOID)
     (tmp_path / "broken.npz").write_text("no archive")
+    (tmp_path / "steered.json").write_text("{}")
     before = (tmp_path / "there.npz").read_bytes()
 
     assert main(["train", *FEW, *options]) == 1
@@ -251,6 +255,21 @@ def test_a_file_of_many_clips_is_named_by_the_first_ones() -> None:
     output = train._output(_options(["train"]), clips)
 
     assert output == Path("policies/humanoid-walk-run-jump-and-2-more.npz")
+
+
+def test_a_folders_clips_are_learned_by_one_policy(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(acceptance, "attempt", no_trials)
+    (tmp_path / "clips").mkdir()
+    for name in ("walk", "kick"):
+        copy(clip_path(HUMANOID, name), tmp_path / "clips" / f"{name}.txt")
+
+    assert main(["train", *FEW, "--clip", "clips", "--output", "two.npz"]) == 0
+
+    policy = read_policy("two.npz", HUMANOID)
+    assert policy.about["clips"] == ["clips/kick.txt", "clips/walk.txt"]
+    assert {name.rsplit(", ")[0] for name in policy.about["figures"]} == {*policy.about["clips"]}
 
 
 def test_a_second_interruption_leaves_out_the_runs(

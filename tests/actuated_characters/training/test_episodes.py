@@ -10,6 +10,7 @@ from actuated_characters.training import episodes as compiled
 from actuated_characters.training.episode_types import CUT, FELL, Table, Trace
 from actuated_characters.training.references import TrainedReference, make_scales, make_table
 from actuated_characters.training.rewards import cost_of
+from actuated_characters.training.starts import Stretch
 from actuated_characters.training.worlds import TrainingWorlds
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.compiled.network import Network
@@ -38,14 +39,14 @@ class Stage:
     def __init__(self) -> None:
         self.worlds = TrainingWorlds(HUMANOID, JOB.settings, JOB.gains, threads=1)
         self.table, _ = make_table(self.worlds.model, self.worlds.body, JOB.references, RATE)
-        rows = np.arange(RATE, dtype=np.intp)
-        self.scales = make_scales(self.table, [rows], self.worlds.model.feature_layout)
+        begins = [Stretch(0, RATE, wraps=True)]
+        self.scales = make_scales(self.table, begins, self.worlds.model.feature_layout)
         self.begin(self.table)
 
     def begin(self, table: Table, row: int = 0) -> None:
         """Begin an episode at a row, in the state of the reference."""
-        starts = [np.array([row], dtype=np.intp)]
-        self.worlds.begin(table, starts, self.scales, 1, np.random.default_rng(3))
+        begins = [Stretch(row, 1, wraps=False)]
+        self.worlds.begin(table, begins, self.scales, 1, np.random.default_rng(3))
         (episode,) = self.worlds._episodes
         self.episode = episode._replace(strength=1.0)
         self.worlds._episodes = [self.episode]
@@ -313,7 +314,7 @@ def test_every_start_is_a_row_of_its_own_reference() -> None:
         model, body = stage.worlds.model, stage.worlds.body
         references = [TrainedReference(walk.reference, 21.0, wraps) for wraps in (True, False)]
         table, starts = make_table(model, body, references, 30)
-        for rows in starts:
+        for rows in (stretch.rows for stretch in starts):
             assert set(table.ends[rows]) == {table.ends[rows[0]]}
             assert (rows < table.ends[rows] - table.ahead[-1]).all()
     finally:

@@ -111,6 +111,7 @@ def random_trace(worlds: int = 3, decisions: int = 40) -> Trace:
         np.zeros((worlds, decisions)),
         ends,
         np.zeros((worlds, decisions), np.intp),
+        np.zeros((worlds, decisions), np.intp),
     )
 
 
@@ -204,7 +205,7 @@ def test_it_learns_what_pays(learner: Learner) -> None:
         reward = -((actions - target) ** 2).sum(-1).astype(float)
         rewards.append(float(-((means - target) ** 2).sum(-1).mean()))
         ends = np.full((count, 1), FELL)
-        trace = Trace(observations, observations, actions, reward, reward, ends, ends)
+        trace = Trace(observations, observations, actions, reward, reward, ends, ends, ends)
         learner.learn(trace, noise, spread, 0.02)
 
     assert rewards[0] == pytest.approx(-1.25, abs=0.2)

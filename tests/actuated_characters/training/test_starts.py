@@ -1,0 +1,96 @@
+"""Episodes begin anywhere, and more often shortly before the moments in which others were lost."""
+
+import numpy as np
+import pytest
+
+from actuated_characters.training.starts import Starts, Stretch
+from msgs_config.arrays import IntArray
+
+RATE = 240
+SECONDS = 10
+WALK, KICK = Stretch(0, RATE * SECONDS, True), Stretch(RATE * 30, RATE * 2, False)
+DRAWS = 20_000
+
+
+def test_every_reference_is_as_likely_and_every_row_of_it() -> None:
+    rows = Starts([WALK, KICK], RATE).draw(DRAWS, np.random.default_rng(1))
+
+    of_kick = rows >= KICK.first
+    assert of_kick.mean() == pytest.approx(0.5, abs=0.02)
+    for each, own in ((WALK, rows[~of_kick]), (KICK, rows[of_kick])):
+        counts = np.histogram(own, 10, (each.first, each.first + each.count))[0]
+        assert counts / len(own) == pytest.approx(0.1, abs=0.015)
+        assert own.min() >= each.first
+        assert own.max() < each.first + each.count
+
+
+def test_a_reference_shorter_than_a_moment_has_all_its_rows() -> None:
+    short = Stretch(5, 3, True)
+
+    rows = Starts([short], RATE).draw(200, np.random.default_rng(1))
+
+    assert set(rows.tolist()) == {5, 6, 7}
+
+
+def test_half_of_the_episodes_begin_up_to_a_second_and_a_half_before_where_it_falls() -> None:
+    starts = learned(WALK, fell_at=RATE * 6)
+
+    seconds = starts.draw(DRAWS, np.random.default_rng(1)) / RATE
+
+    before = ((seconds >= 5.0) & (seconds < 6.5)).mean()
+    assert before == pytest.approx(0.5 + 0.5 * 0.15, abs=0.03)
+    assert ((seconds >= 6.0) & (seconds < 6.5)).mean() > ((seconds >= 5.0) & (seconds < 5.5)).mean()
+    others = seconds[(seconds < 5.0) | (seconds >= 6.5)]
+    counts = np.histogram(others, [0, 1, 2, 3, 4, 5])[0] / DRAWS
+    assert counts == pytest.approx(0.05, abs=0.015), "all the others stay as likely as before"
+
+
+def test_a_motion_that_wraps_falls_in_the_moment_of_its_cycle() -> None:
+    later = learned(WALK, fell_at=RATE * (SECONDS + 6))
+    seconds = later.draw(DRAWS, np.random.default_rng(1)) / RATE
+
+    assert ((seconds >= 5.0) & (seconds < 6.5)).mean() > 0.5
+
+
+def test_a_fall_at_the_beginning_is_told_of_the_end_of_a_motion_that_wraps() -> None:
+    seconds = learned(WALK, fell_at=0).draw(DRAWS, np.random.default_rng(1)) / RATE
+
+    assert ((seconds >= 9.0) | (seconds < 0.5)).mean() > 0.5
+
+
+def test_a_fall_after_a_motion_that_ends_is_one_of_its_last_moment() -> None:
+    starts = learned(KICK, fell_at=KICK.first + KICK.count + RATE // 2)
+
+    seconds = (starts.draw(DRAWS, np.random.default_rng(1)) - KICK.first) / RATE
+
+    assert (seconds >= 0.5).mean() > 0.8
+    assert (seconds < 0.5).mean() == pytest.approx(0.5 * 0.25, abs=0.03)
+
+
+def test_what_is_no_longer_lost_is_no_longer_hard() -> None:
+    starts = learned(WALK, fell_at=RATE * 6)
+    rows, no = visited(WALK)
+    for _ in range(500):
+        starts.learn(rows, no)
+    fell = rows // RATE == 2
+    for _ in range(20):
+        starts.learn(rows, fell)
+
+    seconds = starts.draw(DRAWS, np.random.default_rng(1)) / RATE
+
+    assert ((seconds >= 5.0) & (seconds < 6.5)).mean() < 0.1
+    assert ((seconds >= 1.0) & (seconds < 3.0)).mean() > 0.5
+
+
+def learned(stretch: Stretch, fell_at: int) -> Starts:
+    """Starts where every row was visited a hundred times, and each time one of them was lost."""
+    starts = Starts([stretch], RATE)
+    rows, no = visited(stretch)
+    for _ in range(100):
+        starts.learn(np.append(rows, fell_at), np.append(no, True))
+    return starts
+
+
+def visited(stretch: Stretch) -> tuple[IntArray, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]:
+    """Decisions at all rows, none of which is lost."""
+    return stretch.rows[::8], np.zeros(len(stretch.rows[::8]), dtype=np.bool_)
