@@ -24,6 +24,7 @@ _VALUE_WEIGHT = 4.0
 _RATES = (2e-5, 1e-3)  # between which the policy's rate is led by how much a policy changes
 _TOO_FAR = 3.0  # times the divergence that is aimed at, at which a policy learns no more of a trace
 _LEAST_CALM = 1e-3
+_SOON = 30  # decisions, within which a fall says that it was not calm
 _OVER_WEIGHT = np.float32(0.1)  # of means beyond the largest action
 
 
@@ -170,8 +171,17 @@ class Learner:
         )
 
     def least_expected(self, trace: Trace) -> float:
-        """What is expected in the states of a trace (worlds, decisions) but for a twentieth."""
-        return max(float(np.quantile(self._values(trace.observations), 0.05)), _LEAST_CALM)
+        """What is expected in the states of a trace (worlds, decisions) but for a twentieth.
+
+        States that lead to a fall in `_SOON` do not count.
+        """
+        counts, left = np.empty_like(trace.ends), np.full(len(trace.ends), _SOON)
+        for decision in range(trace.ends.shape[1] - 1, -1, -1):
+            left = np.where(trace.ends[:, decision] == FELL, 0, left + 1)
+            counts[:, decision] = left  # decisions to the next fall
+        expected = self._values(trace.observations)[counts.ravel() >= _SOON]
+        least = float(np.quantile(expected, 0.05)) if expected.size else 0.0
+        return max(least, _LEAST_CALM)
 
     def _values(self, observations: SingleArray) -> FloatArray:
         rows = observations.reshape(-1, observations.shape[-1])

@@ -211,3 +211,20 @@ def test_it_learns_what_pays(learner: Learner) -> None:
     assert rewards[0] == pytest.approx(-1.25, abs=0.2)
     assert rewards[-1] > -0.25
     assert learner._rate <= module._RATES[1]
+
+
+def test_what_is_expected_before_a_fall_is_none_of_a_calm_state(learner: Learner) -> None:
+    """The states of a whole second before it, and those of no other world."""
+    trace = random_trace(2, 100)
+    calm, lost = ([0.5, 0.0, 0.0, 0.0], [-2.0, 1.0, 1.0, 1.0])
+    trace.observations[:], trace.ends[:] = calm, 0
+    trace.observations[0, 70:], trace.ends[0, 99] = lost, FELL
+    (expected,), (poor,) = (
+        forward(learner.value, np.array([each], np.float32))[0][:, 0] for each in (calm, lost)
+    )
+    learner.value.bias_3[:] += np.float32(0.5 - min(expected, poor))  # above the least
+
+    (expected,) = forward(learner.value, np.array([calm], np.float32))[0][:, 0]
+    assert learner.least_expected(trace) == pytest.approx(float(expected), rel=1e-6)
+    trace.ends[0, 99] = 0
+    assert learner.least_expected(trace) != pytest.approx(float(expected), rel=1e-3)
