@@ -24,13 +24,11 @@ from actuated_characters.commands.common.tables import make_facts_table
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.runs.plan import RunPlan
     from actuated_characters.training.acceptance import Trial
     from actuated_characters.training.exercises import Exercise
-    from actuated_characters.training.training import Job, Progress, Training
-    from controller_node.controller_settings import ControllerSettings
+    from actuated_characters.training.job import Job
+    from actuated_characters.training.training import Progress, Training
     from controller_node.planner.policy.file import Policy
-    from controller_node.tracked_reference import TrackedReference
 
 _FOLDER, _SUFFIX = Path("policies"), ".npz"
 _DECISIONS_A_MINUTE = 500_000  # on two processors
@@ -208,11 +206,7 @@ def _output(options: argparse.Namespace, exercises: tuple[str, ...]) -> Path:
 
 def _job(options: argparse.Namespace, exercises: "Sequence[Exercise]") -> "Job":
     """What the options say; raises ActuatedCharactersError if it cannot be trained."""
-    from actuated_characters.training.references import TrainedReference
-    from actuated_characters.training.training import Job
-    from controller_node.controller_settings import check_planned
-    from controller_node.parameters import make_controller_settings
-    from controller_node.planner.settings import make_planner_settings
+    from actuated_characters.training.job import make_job
 
     given = _given(options)
     threads = options.threads if options.threads is not None else len(os.sched_getaffinity(0))
@@ -222,29 +216,19 @@ def _job(options: argparse.Namespace, exercises: "Sequence[Exercise]") -> "Job":
     ):
         if not least <= value < math.inf:
             raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
-    plans = [_plan(exercise, given, options.seed) for exercise in exercises]
-    character, values = plans[0].character, plans[0].controller
-    settings = make_controller_settings(character, values)
-    check_planned(settings)
-    return Job(
-        character,
-        [
-            TrainedReference(_tracked(plan, settings), each.cycle_s, each.wraps)
-            for plan, each in zip(plans, exercises, strict=True)
-        ],
-        tuple(each.name for each in exercises),
-        make_planner_settings(character, values),
-        settings.gains,
-        round(_DECISIONS_A_MINUTE * options.minutes),
-        options.pushes,
-        options.seed,
-        threads,
+    return make_job(
+        exercises,
+        given,
+        decisions=round(_DECISIONS_A_MINUTE * options.minutes),
+        most_push=options.pushes,
+        seed=options.seed,
+        threads=threads,
     )
 
 
 def _start(options: argparse.Namespace, job: "Job", output: Path) -> "Policy | None":
     """The policy that a training begins with; raises ConfigurationError if it cannot."""
-    from actuated_characters.training.training import check_resumed, check_start
+    from actuated_characters.training.job import check_resumed, check_start
     from controller_node.planner.policy.file import read_policy
 
     name = getattr(options, "from")
@@ -257,26 +241,6 @@ def _start(options: argparse.Namespace, job: "Job", output: Path) -> "Policy | N
         check_resumed(job, start)
     check_start(job, start)
     return start
-
-
-def _plan(exercise: "Exercise", given: dict[str, object], seed: int) -> "RunPlan":
-    """A planned run of it, as long as episodes may begin."""
-    from controller_node.planner.settings import PREDICTIVE
-
-    controller = given | {"planner": PREDICTIVE, "plan.workers": 1}
-    return exercise.plan(exercise.cycle_s, {}, controller, seed)[0]
-
-
-def _tracked(plan: "RunPlan", settings: "ControllerSettings") -> "TrackedReference":
-    """The reference of a run as its controller would track it, from the first tick on."""
-    from controller_node.tracked_reference import TrackedReference
-    from msgs_config.messages.clock import TickClock
-
-    tracked = TrackedReference(
-        plan.character, plan.reference, TickClock(plan.simulation.rate_hz), episode_ns=0
-    )
-    tracked.follows_velocity = settings.follows_velocity
-    return tracked
 
 
 def _given(options: argparse.Namespace) -> dict[str, object]:

@@ -1,6 +1,6 @@
 """The course of a training: episodes, learning, and now and then a look at how good a policy is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -8,29 +8,21 @@ from typing import TypeAlias
 import numpy as np
 
 from actuated_characters.training.episode_types import CUT, FELL, Trace
+from actuated_characters.training.job import HIDDEN, Job, decisions_of
 from actuated_characters.training.learner import Learner, LearningSettings
 from actuated_characters.training.references import (
-    TrainedReference,
-    frames_ahead,
     make_scales,
     make_table,
 )
 from actuated_characters.training.worlds import (
     LARGEST_ACTION,
     TrainingWorlds,
-    action_unit,
-    hold_ticks,
 )
-from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.policy.file import Policy, write_policy
-from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import Character
-from msgs_config.errors import ConfigurationError
 
 _WORLDS, _DECISIONS = 64, 48  # of a trace
-_HIDDEN = 128
 _SPREADS = (0.35, 0.12)  # standard deviation of what is tried, at first and in the end
 _FIRST_SPREAD_FROM = 0.2  # at first where it begins with what another policy can
 _DIVERGENCES = (0.03, 0.008)  # of a policy from the one before, at first and in the end
@@ -42,21 +34,6 @@ _LOOKS = 20  # at how good a policy is, in a training
 _LOOK_WORLDS, _LOOK_S = 16, 10.0
 _EXAM_PUSH = 0.5  # of the hardest push, in half of a look
 _FALL_COSTS = 1.0  # reward, of one fall a second
-
-
-@dataclass(frozen=True)
-class Job:
-    """What is to be trained."""
-
-    character: Character
-    references: Sequence[TrainedReference]
-    names: tuple[str, ...]  # of the references
-    settings: PlannerSettings
-    gains: GainArrays
-    decisions: int
-    most_push: float  # N s
-    seed: int
-    threads: int
 
 
 @dataclass(frozen=True)
@@ -73,50 +50,6 @@ class Progress:
 
 Kept: TypeAlias = tuple[Network, Network, Mapping[str, object], float]
 """Policy, value, what they were trained with, and what is expected while it is calm."""
-
-
-def decisions_of(policy: Policy) -> int:
-    """How many decisions a policy was trained with."""
-    return int(policy.about["trained"].get("decisions", 0))
-
-
-def check_resumed(job: Job, start: Policy) -> None:
-    """Raise ConfigurationError if a policy's training cannot go on as a job."""
-    clips, names = ", ".join(start.about["clips"]), ", ".join(job.names)
-    if clips != names:
-        raise ConfigurationError(
-            f"the policy's clips: {clips}, this training's: {names}; --resume goes on with the "
-            "same, --from begins with what a policy of other clips can"
-        )
-    if decisions_of(start) >= job.decisions:
-        raise ConfigurationError(
-            f"the policy was trained with {decisions_of(start):,} decisions, and all --minutes "
-            f"are {job.decisions:,}; --resume goes on with more"
-        )
-
-
-def check_start(job: Job, start: Policy) -> None:
-    """Raise ConfigurationError if a job cannot begin with a policy."""
-    rate, hold = job.settings.parameters.rate_hz, start.hold
-    for name, found, wanted in (
-        ("rate", start.rate_hz, rate),
-        ("hold", hold, hold_ticks(rate)),
-        ("hidden layer", len(start.network.bias_1), _HIDDEN),
-        ("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist()),
-    ):
-        if found != wanted:
-            raise ConfigurationError(
-                f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
-            )
-    for name, given, own in (
-        ("sigma", start.unit, action_unit(job.settings)),
-        ("stiffness", start.stiffness[6:], job.gains.stiffness[6:]),  # no force acts on the root
-        ("damping", start.damping[6:], job.gains.damping[6:]),
-    ):
-        if not np.array_equal(given, own):
-            raise ConfigurationError(
-                f"the policy was trained with another {name}; it must be the same"
-            )
 
 
 class Training:
@@ -154,7 +87,7 @@ class Training:
         self._decision_s = rules.hold * rules.period
         inputs = len(self._scales.deviation) + self._scales.frame_mean.size
         settings = LearningSettings(largest=LARGEST_ACTION)
-        self._learner = Learner((inputs, _HIDDEN, len(rules.unit)), learning, settings)
+        self._learner = Learner((inputs, HIDDEN, len(rules.unit)), learning, settings)
         self._push, self._falls = _LEAST_PUSH, _OFTEN
         self._looked = self._done * _LOOKS // job.decisions
         self._lengths: list[float] = []

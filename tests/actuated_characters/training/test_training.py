@@ -8,9 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from actuated_characters.training import job as job_module
 from actuated_characters.training import training as module
 from actuated_characters.training.episode_types import FELL
-from actuated_characters.training.training import Job, Training, check_resumed, check_start
+from actuated_characters.training.job import Job, check_resumed, check_start
+from actuated_characters.training.training import Training
 from controller_node.planner.policy.file import Policy, read_policy, shipped_policies
 from msgs_config.errors import ConfigurationError
 from tests.support.training import DECISIONS, HUMANOID, arrays_of, make_small, walking_job
@@ -176,7 +178,7 @@ def test_networks_of_another_size_are_refused(
     begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     policy = looked_at(begin()).best({})
-    monkeypatch.setattr(module, "_HIDDEN", 32)
+    monkeypatch.setattr(job_module, "HIDDEN", 32)
 
     with pytest.raises(ConfigurationError, match="hidden layer: 128, this training's: 32"):
         check_start(JOB, policy)

@@ -1,0 +1,125 @@
+"""What is to be trained, and what its training may begin with."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuated_characters.runs.plan import RunPlan
+from actuated_characters.training.exercises import Exercise
+from actuated_characters.training.references import TrainedReference, frames_ahead
+from actuated_characters.training.worlds import action_unit, hold_ticks
+from controller_node.control_laws import GainArrays
+from controller_node.controller_settings import ControllerSettings, check_planned
+from controller_node.parameters import make_controller_settings
+from controller_node.planner.policy.file import Policy
+from controller_node.planner.settings import PREDICTIVE, PlannerSettings, make_planner_settings
+from controller_node.tracked_reference import TrackedReference
+from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
+from msgs_config.messages.clock import TickClock
+
+HIDDEN = 128  # units of each of a policy's two layers
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be trained."""
+
+    character: Character
+    references: Sequence[TrainedReference]
+    names: tuple[str, ...]  # of the references
+    settings: PlannerSettings
+    gains: GainArrays
+    decisions: int
+    most_push: float  # N s
+    seed: int
+    threads: int
+
+
+def make_job(
+    exercises: Sequence[Exercise],
+    controller: Mapping[str, object],
+    *,
+    decisions: int,
+    most_push: float = 0.0,
+    seed: int = 0,
+    threads: int = 1,
+) -> Job:
+    """The job of some exercises of one character; `controller` has the controller's parameters.
+
+    Raises:
+        ActuatedCharactersError: a name or a value is wrong, or no planner can do without the rest.
+    """
+    given = {**controller, "planner": PREDICTIVE, "plan.workers": 1}
+    plans = [each.plan(each.cycle_s, {}, given, seed)[0] for each in exercises]
+    character, values = plans[0].character, plans[0].controller
+    settings = make_controller_settings(character, values)
+    check_planned(settings)
+    references = [
+        TrainedReference(_tracked(plan, settings), each.cycle_s, each.wraps)
+        for plan, each in zip(plans, exercises, strict=True)
+    ]
+    return Job(
+        character,
+        references,
+        tuple(each.name for each in exercises),
+        make_planner_settings(character, values),
+        settings.gains,
+        decisions,
+        most_push,
+        seed,
+        threads,
+    )
+
+
+def _tracked(plan: RunPlan, settings: ControllerSettings) -> TrackedReference:
+    """The reference of a run as its controller would track it, from the first tick on."""
+    clock = TickClock(plan.simulation.rate_hz)
+    tracked = TrackedReference(plan.character, plan.reference, clock, episode_ns=0)
+    tracked.follows_velocity = settings.follows_velocity
+    return tracked
+
+
+def decisions_of(policy: Policy) -> int:
+    """How many decisions a policy was trained with."""
+    return int(policy.about["trained"].get("decisions", 0))
+
+
+def check_resumed(job: Job, start: Policy) -> None:
+    """Raise ConfigurationError if a policy's training cannot go on as a job."""
+    clips, names = ", ".join(start.about["clips"]), ", ".join(job.names)
+    if clips != names:
+        raise ConfigurationError(
+            f"the policy's clips: {clips}, this training's: {names}; --resume goes on with the "
+            "same, --from begins with what a policy of other clips can"
+        )
+    if decisions_of(start) >= job.decisions:
+        raise ConfigurationError(
+            f"the policy was trained with {decisions_of(start):,} decisions, and all --minutes "
+            f"are {job.decisions:,}; --resume goes on with more"
+        )
+
+
+def check_start(job: Job, start: Policy) -> None:
+    """Raise ConfigurationError if a job cannot begin with a policy."""
+    rate, hold = job.settings.parameters.rate_hz, start.hold
+    for name, found, wanted in (
+        ("rate", start.rate_hz, rate),
+        ("hold", hold, hold_ticks(rate)),
+        ("hidden layer", len(start.network.bias_1), HIDDEN),
+        ("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist()),
+    ):
+        if found != wanted:
+            raise ConfigurationError(
+                f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
+            )
+    for name, given, own in (
+        ("sigma", start.unit, action_unit(job.settings)),
+        ("stiffness", start.stiffness[6:], job.gains.stiffness[6:]),  # no force acts on the root
+        ("damping", start.damping[6:], job.gains.damping[6:]),
+    ):
+        if not np.array_equal(given, own):
+            raise ConfigurationError(
+                f"the policy was trained with another {name}; it must be the same"
+            )
