@@ -120,11 +120,12 @@ def _train(options: argparse.Namespace) -> None:
 
     asked = options.clip or ([] if options.steer else ["walk"])
     clips = expand_clips(load_character(options.character), asked)
-    if STEERED in [Path(clip).stem for clip in clips]:
-        raise ConfigurationError(f"--clip {STEERED}: a policy keeps that name for --steer")
-    names = (*clips, STEERED) if options.steer else tuple(clips)
-    exercises = tuple(Exercise(options.character, name) for name in names)
-    output = _output(options, names)
+    for clip in clips:
+        if Path(clip).stem == STEERED:
+            raise ConfigurationError(f"--clip {clip}: a policy keeps that name for --steer")
+    steered = [STEERED] if options.steer else []
+    exercises = tuple(Exercise(options.character, name) for name in (*clips, *steered))
+    output = _output(options, [*asked, *steered])
     from actuated_characters.training.training import Training
 
     began = time.process_time()
@@ -151,7 +152,7 @@ def _train(options: argparse.Namespace) -> None:
 def _go_on(training: "Training", job: "Job", output: Path) -> float:
     """Train to the end, or to Ctrl-C; the policy is in its file then. Returns wall seconds."""
     began = time.monotonic()
-    title = f"{job.character.name}: {', '.join(job.names)}"
+    title = f"{job.character.name}: {', '.join(_few(job.names))}"
     try:
         with progress_bar(title, job.decisions, "decisions") as bar:
             while not training.is_over:
@@ -183,12 +184,15 @@ def _words(progress: "Progress") -> str:
     )
 
 
-def _output(options: argparse.Namespace, exercises: tuple[str, ...]) -> Path:
-    """The policy's file; raises ConfigurationError where it cannot be written."""
-    names = [Path(name).stem for name in exercises]
-    if len(names) > _NAMED_CLIPS:
-        names[_NAMED_CLIPS:] = [f"and-{len(names) - _NAMED_CLIPS}-more"]
-    name = "-".join((Path(options.character).stem, *names))
+def _few(names: "Sequence[str]") -> list[str]:
+    """The first ones, without their folders, and how many more there are."""
+    few = [Path(name).stem for name in names[:_NAMED_CLIPS]]
+    return few if len(names) <= _NAMED_CLIPS else [*few, f"and-{len(names) - _NAMED_CLIPS}-more"]
+
+
+def _output(options: argparse.Namespace, names: "Sequence[str]") -> Path:
+    """The policy's file, by what is asked for; raises ConfigurationError where it cannot be."""
+    name = "-".join((Path(options.character).stem, *_few(names)))
     output: Path = options.output or _FOLDER / (name + _SUFFIX)
     if output.suffix != _SUFFIX:
         raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}")

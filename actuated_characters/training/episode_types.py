@@ -77,4 +77,4 @@ class Trace(NamedTuple):
     costs: FloatArray  # (t,)
     ends: IntArray  # (t,) 0, FELL or CUT
     lengths: IntArray  # (t,) decisions of an episode that ended
-    rows: IntArray  # (t,) of the reference
+    rows: IntArray  # (t,) of the table, in which it was decided

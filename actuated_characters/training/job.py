@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -18,8 +19,10 @@ from controller_node.tracked_reference import TrackedReference
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock
+from msgs_config.parameters import Values
 
 HIDDEN = 128  # units of each of a policy's two layers
+_OWN = ("reference", "clip", "steering.")  # parameters, by how they begin, that differ by exercise
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,14 @@ def make_job(
     """The job of some exercises of one character; `controller` has the controller's parameters.
 
     Raises:
-        ActuatedCharactersError: a name or a value is wrong, or no planner can do without the rest.
+        ActuatedCharactersError: a name or a value is wrong, a planner cannot work with it, or what
+            one clip was reconstructed with is not what the first one needs.
     """
     given = {**controller, "planner": PREDICTIVE, "plan.workers": 1}
     plans = [each.plan(each.cycle_s, {}, given, seed)[0] for each in exercises]
     character, values = plans[0].character, plans[0].controller
+    for exercise, plan in zip(exercises[1:], plans[1:], strict=True):
+        _check_same(exercise, values, plan.controller)
     settings = make_controller_settings(character, values)
     check_planned(settings)
     references = [
@@ -73,6 +79,16 @@ def make_job(
     )
 
 
+def _check_same(exercise: Exercise, first: Values, values: Values) -> None:
+    """Raise ConfigurationError if an exercise brings another value than the first one."""
+    for name in first:
+        if not name.startswith(_OWN) and values[name] != first[name]:
+            raise ConfigurationError(
+                f"{exercise.name} was made with '{name}' {values[name]}, the first one with "
+                f"{first[name]}; one policy takes clips that were made with the same"
+            )
+
+
 def _tracked(plan: RunPlan, settings: ControllerSettings) -> TrackedReference:
     """The reference of a run as its controller would track it, from the first tick on."""
     clock = TickClock(plan.simulation.rate_hz)
@@ -88,8 +104,9 @@ def decisions_of(policy: Policy) -> int:
 
 def check_resumed(job: Job, start: Policy) -> None:
     """Raise ConfigurationError if a policy's training cannot go on as a job."""
-    clips, names = ", ".join(start.about["clips"]), ", ".join(job.names)
-    if clips != names:
+    before, now = ([Path(name).stem for name in each] for each in (start.about["clips"], job.names))
+    clips, names = ", ".join(before), ", ".join(now)
+    if before != now:
         raise ConfigurationError(
             f"the policy's clips: {clips}, this training's: {names}; --resume goes on with the "
             "same, --from begins with what a policy of other clips can"

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from actuated_characters.training.episode_types import FELL, Trace
+from actuated_characters.training.episode_types import CUT, FELL, Trace
 from controller_node.planner.compiled.network import Network
 from msgs_config.arrays import FloatArray, IntArray, SingleArray
 
@@ -24,7 +24,7 @@ _VALUE_WEIGHT = 4.0
 _RATES = (2e-5, 1e-3)  # between which the policy's rate is led by how much a policy changes
 _TOO_FAR = 3.0  # times the divergence that is aimed at, at which a policy learns no more of a trace
 _LEAST_CALM = 1e-3
-_SOON = 30  # decisions, within which a fall says that it was not calm
+_FALLS_SOON = 30  # decisions, 1 s: a state from which it falls so soon is not calm
 _OVER_WEIGHT = np.float32(0.1)  # of means beyond the largest action
 
 
@@ -173,14 +173,16 @@ class Learner:
     def least_expected(self, trace: Trace) -> float:
         """What is expected in the states of a trace (worlds, decisions) but for a twentieth.
 
-        States that lead to a fall in `_SOON` do not count.
+        States that lead to a fall within `_FALLS_SOON`, or may, as the trace is over before, do not
+        count, if there are others.
         """
-        counts, left = np.empty_like(trace.ends), np.full(len(trace.ends), _SOON)
+        until_fall, left = np.empty_like(trace.ends), np.zeros(len(trace.ends), np.intp)
         for decision in range(trace.ends.shape[1] - 1, -1, -1):
-            left = np.where(trace.ends[:, decision] == FELL, 0, left + 1)
-            counts[:, decision] = left  # decisions to the next fall
-        expected = self._values(trace.observations)[counts.ravel() >= _SOON]
-        least = float(np.quantile(expected, 0.05)) if expected.size else 0.0
+            ends = trace.ends[:, decision]
+            left = np.where(ends == FELL, 0, np.where(ends == CUT, _FALLS_SOON, left + 1))
+            until_fall[:, decision] = left
+        expected, stays = self._values(trace.observations), until_fall.ravel() >= _FALLS_SOON
+        least = float(np.quantile(expected[stays] if stays.any() else expected, 0.05))
         return max(least, _LEAST_CALM)
 
     def _values(self, observations: SingleArray) -> FloatArray:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuated_characters.training.episode_types import Table
-from actuated_characters.training.starts import Stretch
+from actuated_characters.training.starts import StartRange
 from controller_node.planner.compiled.features import FeatureLayout
 from controller_node.planner.compiled.observation import (
     ObservationScales,
@@ -43,17 +43,17 @@ def frames_ahead(rate_hz: int) -> IntArray:
 
 def make_table(
     model: ContactModel, body: RolloutModel, references: Sequence[TrainedReference], rate_hz: int
-) -> tuple[Table, list[Stretch]]:
+) -> tuple[Table, list[StartRange]]:
     """References as one table, and of each the rows in which episodes may begin."""
     ahead = frames_ahead(rate_hz)
-    parts, starts, first = list[tuple[FloatArray, ...]](), list[Stretch](), 0
+    parts, starts, first = list[tuple[FloatArray, ...]](), list[StartRange](), 0
     for each in references:
         seconds = each.cycle_s + _AFTER_S
         if each.wraps:
             seconds = max(seconds, _WRAPPED_S)
         count = round(seconds * rate_hz) + int(ahead[-1]) + 2
         parts.append(_sample(model, body, each.reference, count))
-        starts.append(Stretch(first, max(round(each.cycle_s * rate_hz), 1), each.wraps))
+        starts.append(StartRange(first, max(round(each.cycle_s * rate_hz), 1), each.wraps))
         first += count
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     lasts = np.cumsum([len(part[0]) for part in parts]) - 1
@@ -81,7 +81,7 @@ def _sample(
 
 
 def make_scales(
-    table: Table, starts: Sequence[Stretch], layout: FeatureLayout
+    table: Table, starts: Sequence[StartRange], layout: FeatureLayout
 ) -> ObservationScales:
     """Scales of observations: fixed for deviations, of frames by how they vary."""
     centre, deviation = layout.centre, np.repeat(_DEVIATIONS, layout.sizes)

@@ -14,7 +14,7 @@ from actuated_characters.training.episode_types import (
     World,
 )
 from actuated_characters.training.episodes import begin, run_decisions
-from actuated_characters.training.starts import Starts, Stretch
+from actuated_characters.training.starts import StartRange, Starts
 from controller_node.control_laws import GainArrays
 from controller_node.planner.compiled.law import Room
 from controller_node.planner.compiled.network import Network
@@ -89,7 +89,7 @@ class TrainingWorlds:
     def begin(
         self,
         table: Table,
-        starts: Sequence[Stretch],
+        starts: Sequence[StartRange],
         scales: ObservationScales,
         count: int,
         rng: np.random.Generator,
@@ -156,7 +156,7 @@ class TrainingWorlds:
         return trace, noise
 
     def prefer_hard_starts(self, trace: Trace) -> None:
-        """Let more episodes begin shortly before the moments in which those of a trace fell."""
+        """Let more episodes begin around the rows in which those of a trace fell."""
         self._starts.learn(trace.rows, trace.ends == FELL)
 
     def _make_rules(self, scales: ObservationScales) -> Rules:

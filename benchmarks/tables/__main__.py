@@ -78,7 +78,7 @@ def main() -> int:
 def _runs(options: argparse.Namespace, folder: Path) -> list[Result]:
     """What becomes of all cases that are asked for; prints each, and the table."""
     table, console = TABLES[options.table], Console(width=_WIDTH)
-    chosen = options.kinds or [kind for kind in table.kinds if kind != "any"]
+    chosen = options.kinds or [kind for kind in table.kinds if kind not in table.asked_for]
     for kind in chosen:
         if kind not in table.kinds and not table.takes_files:
             raise ConfigurationError(one_of("kind", kind, list(table.kinds)))

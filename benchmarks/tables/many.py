@@ -40,6 +40,7 @@ class RunTable:
     cases: Callable[[str, Options], Iterable[Case]]
     measure: Measure
     takes_files: bool = False  # whether files may be kinds
+    asked_for: Sequence[str] = ()  # kinds that are made where they are named alone
 
 
 def attempt(case: Case, measure: Measure) -> Mapping[str, Fact]:

@@ -81,7 +81,7 @@ class PushKind:
     pushes: int = 1
     every: float = 2.0  # s
     lasts: float = 0.2  # s that each push lasts
-    balls: bool = False  # balls at the chest, so heavy; the clip's heading is forwards
+    balls: bool = False  # at the chest, of the impulse at BALL_SPEED; the clip heads forwards
     stands: bool = False  # it stands instead of walking
     seconds: float = 8.5
     behaviour: str = "tracking"
@@ -231,7 +231,11 @@ TABLES: Mapping[str, RunTable] = {
         measure_clip,
     ),
     "pushes": RunTable(
-        "what the planner does not know of", [*PUSH_KINDS], push_cases, measure_push
+        "what the planner does not know of",
+        [*PUSH_KINDS],
+        push_cases,
+        measure_push,
+        asked_for=("jolt", "drags", "heavy balls", "any"),
     ),
     "courses": RunTable(
         "commanded courses, planned", ["eight", "stop", "moods"], course_cases, measure_course

@@ -10,7 +10,7 @@ from actuated_characters.training import episodes as compiled
 from actuated_characters.training.episode_types import CUT, FELL, Table, Trace
 from actuated_characters.training.references import TrainedReference, make_scales, make_table
 from actuated_characters.training.rewards import cost_of
-from actuated_characters.training.starts import Stretch
+from actuated_characters.training.starts import StartRange
 from actuated_characters.training.worlds import TrainingWorlds
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.compiled.network import Network
@@ -39,13 +39,13 @@ class Stage:
     def __init__(self) -> None:
         self.worlds = TrainingWorlds(HUMANOID, JOB.settings, JOB.gains, threads=1)
         self.table, _ = make_table(self.worlds.model, self.worlds.body, JOB.references, RATE)
-        begins = [Stretch(0, RATE, wraps=True)]
+        begins = [StartRange(0, RATE, wraps=True)]
         self.scales = make_scales(self.table, begins, self.worlds.model.feature_layout)
         self.begin(self.table)
 
     def begin(self, table: Table, row: int = 0) -> None:
         """Begin an episode at a row, in the state of the reference."""
-        begins = [Stretch(row, 1, wraps=False)]
+        begins = [StartRange(row, 1, wraps=False)]
         self.worlds.begin(table, begins, self.scales, 1, np.random.default_rng(3))
         (episode,) = self.worlds._episodes
         self.episode = episode._replace(strength=1.0)
@@ -319,3 +319,12 @@ def test_every_start_is_a_row_of_its_own_reference() -> None:
             assert (rows < table.ends[rows] - table.ahead[-1]).all()
     finally:
         stage.worlds.close()
+
+
+def test_a_trace_has_the_row_of_each_decision(stage: Stage) -> None:
+    stage.begin(stage.table, row=40)
+
+    trace = stage.go_on(3)
+
+    assert not trace.ends.any()
+    assert trace.rows.tolist() == [40, 48, 56]

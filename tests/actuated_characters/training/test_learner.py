@@ -1,6 +1,6 @@
 """Learning against independent derivatives, a plain Adam, plain recursions and a toy problem."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pytest
@@ -213,18 +213,40 @@ def test_it_learns_what_pays(learner: Learner) -> None:
     assert learner._rate <= module._RATES[1]
 
 
-def test_what_is_expected_before_a_fall_is_none_of_a_calm_state(learner: Learner) -> None:
-    """The states of a whole second before it, and those of no other world."""
-    trace = random_trace(2, 100)
-    calm, lost = ([0.5, 0.0, 0.0, 0.0], [-2.0, 1.0, 1.0, 1.0])
-    trace.observations[:], trace.ends[:] = calm, 0
-    trace.observations[0, 70:], trace.ends[0, 99] = lost, FELL
-    (expected,), (poor,) = (
-        forward(learner.value, np.array([each], np.float32))[0][:, 0] for each in (calm, lost)
-    )
-    learner.value.bias_3[:] += np.float32(0.5 - min(expected, poor))  # above the least
+def least_of(learner: Learner, trace: Trace, lows: Mapping[tuple[int, int], int]) -> bool:
+    """Whether low states count: entries of a trace, world and first decision, so many of them."""
+    states = np.random.default_rng(6).normal(size=(50, 4)).astype(np.float32)
+    values = forward(learner.value, states)[0][:, 0]
+    trace.observations[:] = states[values.argmax()]
+    for (world, first), count in lows.items():
+        trace.observations[world, first : first + count] = states[values.argmin()]
+    learner.value.bias_3[:] += np.float32(0.5) - values.min()  # above the least that is told
+    return learner.least_expected(trace) < 0.5 + 0.5 * float(np.ptp(values))
 
-    (expected,) = forward(learner.value, np.array([calm], np.float32))[0][:, 0]
-    assert learner.least_expected(trace) == pytest.approx(float(expected), rel=1e-6)
-    trace.ends[0, 99] = 0
-    assert learner.least_expected(trace) != pytest.approx(float(expected), rel=1e-3)
+
+@pytest.mark.parametrize(
+    ("ends", "lows", "counts"),
+    [
+        ({(0, 99): FELL}, {(0, 70): 30}, False),
+        ({(0, 99): FELL}, {(0, 55): 15}, True),  # more than a second before
+        ({(0, 99): FELL}, {(1, 50): 20}, True),  # another world's
+        ({(0, 69): CUT, (0, 71): FELL}, {(0, 50): 20}, True),  # another episode's
+        ({}, {(0, 50): 20}, True),
+        ({}, {(0, 70): 30, (1, 70): 30}, False),  # nobody knows what follows
+        ({(0, each): FELL for each in range(20, 100, 20)}, {(0, 0): 100}, False),
+        ({(w, each): FELL for w in (0, 1) for each in range(9, 100, 10)}, {(0, 0): 100}, True),
+    ],
+)
+def test_states_that_lead_to_a_fall_are_none_of_a_calm_motion(
+    learner: Learner,
+    ends: Mapping[tuple[int, int], int],
+    lows: Mapping[tuple[int, int], int],
+    counts: bool,
+) -> None:
+    """Those of the second before, of the same episode; where there are no others, all count."""
+    trace = random_trace(2, 100)
+    trace.ends[:] = 0
+    for entry, end in ends.items():
+        trace.ends[entry] = end
+
+    assert least_of(learner, trace, lows) == counts

@@ -1,14 +1,14 @@
-"""Episodes begin anywhere, and more often shortly before the moments in which others were lost."""
+"""Episodes begin anywhere, and more often around where others fell."""
 
 import numpy as np
 import pytest
 
-from actuated_characters.training.starts import Starts, Stretch
-from msgs_config.arrays import IntArray
+from actuated_characters.training.starts import StartRange, Starts
+from msgs_config.arrays import BoolArray, IntArray
 
 RATE = 240
 SECONDS = 10
-WALK, KICK = Stretch(0, RATE * SECONDS, True), Stretch(RATE * 30, RATE * 2, False)
+WALK, KICK = StartRange(0, RATE * SECONDS, True), StartRange(RATE * 30, RATE * 2, False)
 DRAWS = 20_000
 
 
@@ -24,15 +24,15 @@ def test_every_reference_is_as_likely_and_every_row_of_it() -> None:
         assert own.max() < each.first + each.count
 
 
-def test_a_reference_shorter_than_a_moment_has_all_its_rows() -> None:
-    short = Stretch(5, 3, True)
+def test_a_reference_shorter_than_a_bin_has_all_its_rows() -> None:
+    short = StartRange(5, 3, True)
 
     rows = Starts([short], RATE).draw(200, np.random.default_rng(1))
 
     assert set(rows.tolist()) == {5, 6, 7}
 
 
-def test_half_of_the_episodes_begin_up_to_a_second_and_a_half_before_where_it_falls() -> None:
+def test_half_of_the_episodes_begin_in_the_bin_of_the_falls_and_the_two_before() -> None:
     starts = learned(WALK, fell_at=RATE * 6)
 
     seconds = starts.draw(DRAWS, np.random.default_rng(1)) / RATE
@@ -45,7 +45,7 @@ def test_half_of_the_episodes_begin_up_to_a_second_and_a_half_before_where_it_fa
     assert counts == pytest.approx(0.05, abs=0.015), "all the others stay as likely as before"
 
 
-def test_a_motion_that_wraps_falls_in_the_moment_of_its_cycle() -> None:
+def test_a_motion_that_wraps_falls_in_the_bin_of_its_cycle() -> None:
     later = learned(WALK, fell_at=RATE * (SECONDS + 6))
     seconds = later.draw(DRAWS, np.random.default_rng(1)) / RATE
 
@@ -58,7 +58,7 @@ def test_a_fall_at_the_beginning_is_told_of_the_end_of_a_motion_that_wraps() -> 
     assert ((seconds >= 9.0) | (seconds < 0.5)).mean() > 0.5
 
 
-def test_a_fall_after_a_motion_that_ends_is_one_of_its_last_moment() -> None:
+def test_a_fall_after_a_motion_that_ends_is_one_of_its_last_bin() -> None:
     starts = learned(KICK, fell_at=KICK.first + KICK.count + RATE // 2)
 
     seconds = (starts.draw(DRAWS, np.random.default_rng(1)) - KICK.first) / RATE
@@ -82,15 +82,38 @@ def test_what_is_no_longer_lost_is_no_longer_hard() -> None:
     assert ((seconds >= 1.0) & (seconds < 3.0)).mean() > 0.5
 
 
-def learned(stretch: Stretch, fell_at: int) -> Starts:
+def test_each_reference_keeps_its_share_however_hard_one_is() -> None:
+    """The falls of one change nothing in the others; rows are those of its own."""
+    first, last = StartRange(0, RATE * 4, True), StartRange(RATE * 60, RATE * SECONDS, True)
+    starts = Starts([first, KICK, last], RATE)
+    for _ in range(100):
+        for each in (first, KICK, last):
+            starts.learn(*visited(each))
+        starts.learn(np.array([last.first + RATE * (SECONDS + 6)]), np.array([True]))
+
+    rows = starts.draw(DRAWS, np.random.default_rng(1))
+
+    of_last = rows >= last.first
+    of_kick = (rows >= KICK.first) & ~of_last
+    assert of_last.mean() == pytest.approx(1.0 / 3.0, abs=0.02)
+    assert of_kick.mean() == pytest.approx(1.0 / 3.0, abs=0.02)
+    seconds = (rows[of_last] - last.first) / RATE
+    assert ((seconds >= 5.0) & (seconds < 6.5)).mean() > 0.5
+    counts = np.histogram(rows[of_kick], 4, (KICK.first, KICK.first + KICK.count))[0]
+    assert counts / of_kick.sum() == pytest.approx(0.25, abs=0.03)
+
+
+def learned(where: StartRange, fell_at: int) -> Starts:
     """Starts where every row was visited a hundred times, and each time one of them was lost."""
-    starts = Starts([stretch], RATE)
-    rows, no = visited(stretch)
+    starts = Starts([where], RATE)
+    rows, no = visited(where)
     for _ in range(100):
         starts.learn(np.append(rows, fell_at), np.append(no, True))
     return starts
 
 
-def visited(stretch: Stretch) -> tuple[IntArray, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]:
+def visited(
+    where: StartRange,
+) -> tuple[IntArray, BoolArray]:
     """Decisions at all rows, none of which is lost."""
-    return stretch.rows[::8], np.zeros(len(stretch.rows[::8]), dtype=np.bool_)
+    return where.rows[::8], np.zeros(len(where.rows[::8]), dtype=np.bool_)

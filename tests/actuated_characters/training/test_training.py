@@ -8,12 +8,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from actuated_characters.training import exercises
 from actuated_characters.training import job as job_module
 from actuated_characters.training import training as module
-from actuated_characters.training.episode_types import FELL
-from actuated_characters.training.job import Job, check_resumed, check_start
+from actuated_characters.training.episode_types import FELL, Trace
+from actuated_characters.training.exercises import Exercise
+from actuated_characters.training.job import Job, check_resumed, check_start, make_job
 from actuated_characters.training.training import Training
 from controller_node.planner.policy.file import Policy, read_policy, shipped_policies
+from msgs_config.arrays import SingleArray
 from msgs_config.errors import ConfigurationError
 from tests.support.training import DECISIONS, HUMANOID, arrays_of, make_small, walking_job
 
@@ -174,6 +177,22 @@ def test_it_goes_on_with_the_same_and_with_more(
         check_resumed(JOB, replace(policy, about={**policy.about, **change}))
 
 
+def test_clips_that_were_made_with_other_parameters_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def bring(character: object, clip: str, simulator: object, given: dict[str, object]) -> None:
+        if clip == "run":
+            given["gain_scale.p"] = 0.5
+
+    monkeypatch.setattr(exercises, "bring_parameters", bring)
+    walk, run = (Exercise("humanoid", name) for name in ("walk", "run"))
+
+    with pytest.raises(
+        ConfigurationError, match=r"run was made with 'gain_scale\.p' 0\.5, the first"
+    ):
+        make_job([walk, run], {}, decisions=1)
+
+
 def test_networks_of_another_size_are_refused(
     begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -270,6 +289,26 @@ def test_a_policy_that_falls_is_worse_than_one_that_costs_a_little_more(
     monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
 
     assert [training._look(), training._look()] == [True, False]
+
+
+def test_episodes_begin_more_often_where_others_fell(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = begin()
+    run, even = training._worlds.run, training._worlds._starts._weights
+
+    def run_and_fall(*given: object) -> tuple[Trace, SingleArray]:
+        trace, noise = run(*given)  # type: ignore[arg-type]
+        trace.ends[:] = np.where(trace.rows < 100, FELL, 0)  # in the first of three bins
+        return trace, noise
+
+    monkeypatch.setattr(training._worlds, "run", run_and_fall)
+    while not training.is_over:
+        training.go_on()
+
+    shares = training._worlds._starts._weights / even
+    assert shares[0] > shares[2] > shares[1] > 0.0
+    assert (training._judges._starts._weights == even).all(), "a look is the same each time"
 
 
 def test_it_looks_as_often_as_it_should(begin: Callable[..., Training]) -> None:
