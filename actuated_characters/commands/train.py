@@ -239,6 +239,8 @@ def _start(options: argparse.Namespace, job: "Job", output: Path) -> "Policy | N
     if options.resume and output.exists():
         name = str(output)
     if name is None:
+        if options.resume:
+            _say(f"there is no {output}: the training begins")
         return None
     start = read_policy(name, job.character)
     if options.resume:

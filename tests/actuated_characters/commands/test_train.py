@@ -192,8 +192,11 @@ def test_it_overwrites_and_goes_on(
 ) -> None:
     make_small(monkeypatch, _LOOKS=1)
     monkeypatch.setattr(acceptance, "attempt", no_trials)
-    write_random_policy(tmp_path / "walk.npz", HUMANOID)
     given = ["train", "--output", "walk.npz", "--threads", "1"]
+
+    assert main([*given, "--minutes", "0.01", "--resume"]) == 0
+    assert "there is no walk.npz: the training begins" in capsys.readouterr().err
+    write_random_policy(tmp_path / "walk.npz", HUMANOID)
 
     assert main([*given, "--minutes", "0.01", "--overwrite"]) == 0
     assert read_policy("walk.npz", HUMANOID).about["trained"]["decisions"] == 64
