@@ -28,7 +28,12 @@ from tests.support.runs import summary_of
 HUMANOID = character("humanoid")
 CLOCK = TickClock(240)
 WALK: dict[str, object] = {"reference": "clip", "clip": "walk"}
-GIVEN: dict[str, object] = {"planner": "hybrid", "plan.workers": 1, "plan.samples": 8}
+GIVEN: dict[str, object] = {
+    "planner": "hybrid",
+    "plan.workers": 1,
+    "plan.samples": 8,
+    "plan.rounds": 2,
+}
 VALUES = resolve_for(HUMANOID, {**WALK, **GIVEN})
 REFERENCE = make_motion(HUMANOID, VALUES).reference
 GAINS = make_controller_settings(HUMANOID, VALUES).gains
@@ -173,7 +178,8 @@ def test_a_run_has_the_same_bits_again_and_in_a_replay(tmp_path: Path) -> None:
     for name in ("one", "other"):
         command = ["run", "--in-process", "--clip", "walk", "--duration", "1.2"]
         command += ["--planner", "hybrid", "--push", "chest:0,500,0@0.4"]
-        command += ["--set", "controller_node.plan.samples:=8", "--output", str(tmp_path / name)]
+        command += ["--set", "controller_node.plan.samples:=8"]
+        command += ["--set", "controller_node.plan.rounds:=2", "--output", str(tmp_path / name)]
         assert main(command) == 0
         hashes.append(summary_of(tmp_path / name)["state_hash"])
 
