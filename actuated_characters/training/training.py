@@ -10,14 +10,8 @@ import numpy as np
 from actuated_characters.training.episode_types import CUT, FELL, Trace
 from actuated_characters.training.job import HIDDEN, Job, decisions_of
 from actuated_characters.training.learner import Learner, LearningSettings
-from actuated_characters.training.references import (
-    make_scales,
-    make_table,
-)
-from actuated_characters.training.worlds import (
-    LARGEST_ACTION,
-    TrainingWorlds,
-)
+from actuated_characters.training.references import make_scales, make_table
+from actuated_characters.training.worlds import LARGEST_ACTION, TrainingWorlds
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.policy.file import Policy, write_policy
 from msgs_config.arrays import FloatArray

@@ -112,8 +112,6 @@ def learned(where: StartRange, fell_at: int) -> Starts:
     return starts
 
 
-def visited(
-    where: StartRange,
-) -> tuple[IntArray, BoolArray]:
+def visited(where: StartRange) -> tuple[IntArray, BoolArray]:
     """Decisions at all rows, none of which is lost."""
     return where.rows[::8], np.zeros(len(where.rows[::8]), dtype=np.bool_)
