@@ -23,7 +23,7 @@ from actuated_characters.commands.render import add_render
 from actuated_characters.commands.replay import add_replay
 from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
-from actuated_characters.commands.train import add_train
+from actuated_characters.commands.train.command import add_train
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.ros_environment import check_domain_id

@@ -26,3 +26,8 @@ def progress_bar(
     )
     bar.add_task(description, total=total, state="")
     return bar
+
+
+def say(text: str) -> None:
+    """Print a line on standard error, as it is."""
+    Console(stderr=True).print(text, soft_wrap=True, markup=False, highlight=False)

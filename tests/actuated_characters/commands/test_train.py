@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from actuated_characters.cli import main
-from actuated_characters.commands import train
 from actuated_characters.commands.common.interruption import Interrupted
+from actuated_characters.commands.train import command, outcome, preparing
 from actuated_characters.training import acceptance, exercises
 from actuated_characters.training.acceptance import Trial
 from actuated_characters.training.exercises import Exercise
@@ -31,10 +31,11 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Minutes of few decisions, tried for a moment, where files may be left."""
     monkeypatch.chdir(tmp_path)
     make_small(monkeypatch)
-    monkeypatch.setattr(train, "_DECISIONS_A_MINUTE", 6_400)
+    for module in (command, preparing):
+        monkeypatch.setattr(module, "DECISIONS_A_MINUTE", 6_400)
     monkeypatch.setattr(exercises, "_TRIED_S", 0.4)
     monkeypatch.setattr(exercises, "_DRIVEN_S", 1.0)
-    monkeypatch.setattr(train, "_TRIALS", 2)
+    monkeypatch.setattr(outcome, "_TRIALS", 2)
 
 
 @pytest.mark.slow
@@ -116,7 +117,7 @@ def test_it_says_how_to_play_another_character(capsys: pytest.CaptureFixture[str
     parser_given = ["--character", "my robot.urdf", "--set", "controller_node.rate:=120"]
     options = _options(["train", *parser_given])
 
-    train._say_how_to_play(options, Exercise("my robot.urdf", "my clip.csv"), Path("a b.npz"))
+    outcome.say_how_to_play(options, Exercise("my robot.urdf", "my clip.csv"), Path("a b.npz"))
 
     assert capsys.readouterr().out.split("play it: ")[1].strip() == (
         "actuated_characters run --clip 'my clip.csv' --planner policy --character "
@@ -255,7 +256,7 @@ def test_who_ends_it_for_good_has_the_best_without_runs(monkeypatch: pytest.Monk
 def test_a_file_of_many_clips_is_named_by_the_first_ones() -> None:
     clips = ("walk", "run", "a/jump.csv", "roll", "kick")
 
-    output = train._output(_options(["train"]), clips)
+    output = preparing.output_file(_options(["train"]), clips)
 
     assert output == Path("policies/humanoid-walk-run-jump-and-2-more.npz")
 
@@ -275,24 +276,33 @@ def test_a_folders_clips_are_learned_by_one_policy(
     assert {name.rsplit(", ", 1)[0] for name in policy.about["figures"]} == {*policy.about["clips"]}
 
 
-def test_a_second_interruption_leaves_out_the_runs(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+@pytest.mark.parametrize("over", [0, 1])
+def test_a_second_interruption_leaves_out_the_runs_that_are_not_over(
+    over: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
 ) -> None:
     make_small(monkeypatch, _LOOKS=10_000)
     interrupted_at(monkeypatch, 1)
+    left = [no_trials()] * over
 
     def interrupted(*ignored: object) -> Trial:
+        if left:
+            return left.pop()
         raise Interrupted
 
     monkeypatch.setattr(acceptance, "attempt", interrupted)
 
     assert main(["train", "--minutes", "10", "--output", "walk.npz"]) == 0
 
-    assert read_policy("walk.npz", HUMANOID).about["figures"] == {}
+    figures = read_policy("walk.npz", HUMANOID).about["figures"]
+    assert [each["to the end"] for each in figures.values()] == ["1 of 1"] * over
     said = capsys.readouterr()
     assert "play it:" in said.out
     assert "Traceback" not in said.err
-    assert [path.name for path in tmp_path.iterdir()] == ["walk.npz"]
+    kept = ["walk-played", "walk.npz"] if over else ["walk.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == kept
 
 
 def test_an_interruption_before_anything_is_worth_keeping_leaves_the_file(

@@ -1,0 +1,1 @@
+"""The command `actuated_characters train`."""
