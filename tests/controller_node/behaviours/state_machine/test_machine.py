@@ -1,5 +1,6 @@
 """The state machine `walk` in the simulator, and what other machines' states do there."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.velocities import plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
+from benchmarks.tables.machines import steps_urdf
 from controller_node.balance import BalanceGains
 from controller_node.parameters import make_controller
 from controller_node.references.trajectory import TrajectoryPoints
@@ -23,9 +25,14 @@ sides:
 """
 
 
-def planned(seconds: float, commands: str = "", **controller: object) -> RunPlan:
-    settings = {**MACHINE, **controller}
-    plan = make_plan("humanoid", seconds, {}, {"wrench_duration": 0.2}, settings)
+def planned(
+    seconds: float,
+    commands: str = "",
+    simulator: Mapping[str, object] | None = None,
+    **controller: object,
+) -> RunPlan:
+    settings, given = {**MACHINE, **controller}, {"wrench_duration": 0.2, **(simulator or {})}
+    plan = make_plan("humanoid", seconds, {}, given, settings)
     return plan_velocities(plan, commands)[0] if commands else plan
 
 
@@ -95,6 +102,21 @@ def test_it_stays_upright_in_bends_and_aside(command: str) -> None:
     assert positions[:, 2].min() > 0.7
     assert np.abs([_tilt(row[3:6]) for row in positions[::12]]).max() < 0.3
     assert states[-1].split()[0] in ("step", "stride")
+
+
+@pytest.mark.slow
+def test_a_foot_that_hits_the_edge_of_a_step_does_not_stand_yet(tmp_path: Path) -> None:
+    """It swings on until it bears the body; taken for standing, it turned on the edge, and fell."""
+    ground = tmp_path / "steps.urdf"
+    ground.write_text(steps_urdf([0.03, 0.0, 0.03, 0.06], start=1.9))
+    positions, _, states = run(
+        planned(7.0, "0.6,0,0@0.5", {"terrain": str(ground), "engine": "mujoco"})
+    )
+
+    assert positions[-1, 0] > 3.0
+    assert positions[:, 2].min() > 0.7
+    assert np.abs([_tilt(row[3:6]) for row in positions[::12]]).max() < 0.3
+    assert states[-1].startswith("step")
 
 
 def _tilt(rotation_vector: np.ndarray) -> float:
