@@ -56,8 +56,9 @@ def output_file(options: argparse.Namespace, names: Sequence[str]) -> Path:
 
 def few(names: Sequence[str]) -> list[str]:
     """The first ones, without their folders, and how many more there are."""
-    few = [Path(name).stem for name in names[:_NAMED_CLIPS]]
-    return few if len(names) <= _NAMED_CLIPS else [*few, f"and-{len(names) - _NAMED_CLIPS}-more"]
+    first = [Path(name).stem for name in names[:_NAMED_CLIPS]]
+    more = len(names) - len(first)
+    return [*first, f"and-{more}-more"] if more else first
 
 
 def given_parameters(options: argparse.Namespace) -> dict[str, object]:
