@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from actuated_characters.commands.common.progress import progress_bar
+from actuated_characters.commands.common.result_file import check_not_lost, result_file
 from actuated_characters.commands.common.settings import (
     CHARACTER,
     NODES,
@@ -147,16 +148,9 @@ def _output(options: argparse.Namespace) -> Path:
     from actuated_characters.reconstruction.checkpoint import checkpoint_path
 
     name = f"{Path(options.character).stem}-{Path(options.clip).stem}{_SUFFIX}"
-    output: Path = options.output or _FOLDER / name
-    if output.suffix != _SUFFIX:
-        raise ConfigurationError(f"--output is {output}; it must end in {_SUFFIX}")
-    if options.output is not None and not output.absolute().parent.is_dir():
-        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
-    if output.is_dir():
-        raise ConfigurationError(f"--output is {output}; it is a directory")
-    for file in (output, checkpoint_path(output)):
-        if file.exists() and not (options.resume or options.overwrite):
-            raise ConfigurationError(f"{file} exists; --resume goes on, --overwrite starts over")
+    output = result_file(options.output, _FOLDER / name)
+    files = (output, checkpoint_path(output))
+    check_not_lost(files, resume=options.resume, overwrite=options.overwrite)
     return output
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from actuated_characters.commands.common.progress import say
+from actuated_characters.commands.common.result_file import check_not_lost, result_file
 from actuated_characters.commands.common.settings import node_settings
 from actuated_characters.commands.train.command import DECISIONS_A_MINUTE, FOLDER, SUFFIX
 from actuated_characters.training.exercises import Exercise
@@ -39,18 +40,8 @@ def asked_for(options: argparse.Namespace) -> tuple[list[Exercise], Path]:
 def output_file(options: argparse.Namespace, names: Sequence[str]) -> Path:
     """The policy's file, by what is asked for; raises ConfigurationError where it cannot be."""
     name = "-".join((Path(options.character).stem, *few(names)))
-    output: Path = options.output or FOLDER / (name + SUFFIX)
-    if output.suffix != SUFFIX:
-        raise ConfigurationError(f"--output is {output}; it must end in {SUFFIX}")
-    if options.output is not None and not output.absolute().parent.is_dir():
-        raise ConfigurationError(f"--output is {output}; there is no directory {output.parent}")
-    if output.is_dir():
-        raise ConfigurationError(f"--output is {output}; it is a directory")
-    folder = next(each for each in output.absolute().parents if each.exists())
-    if not os.access(folder, os.W_OK):
-        raise ConfigurationError(f"--output is {output}; no permission to write to {folder}")
-    if output.exists() and not (options.resume or options.overwrite):
-        raise ConfigurationError(f"{output} exists; --resume goes on, --overwrite starts over")
+    output = result_file(options.output, FOLDER / (name + SUFFIX))
+    check_not_lost([output], resume=options.resume, overwrite=options.overwrite)
     return output
 
 
