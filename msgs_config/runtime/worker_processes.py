@@ -47,9 +47,14 @@ class WorkerProcesses:
             return self._pool.submit(task, *given, **named)
 
     def map(self, task: Callable[[Item], T], items: Iterable[Item]) -> Iterator[T]:
-        """Begin a task for each item; their results in order, as they are asked for."""
+        """Begin a task for each item; their results in order, as they are asked for.
+
+        The pool's own `map` cancels what an interrupt leaves; a pool whose processes are ended
+        then fails over what is cancelled, and waits for ever at the exit (seen in Python 3.11).
+        """
         with _interrupts_blocked():
-            return self._pool.map(task, items)
+            begun = [self._pool.submit(task, item) for item in items]
+        return (future.result() for future in begun)
 
 
 @contextmanager
