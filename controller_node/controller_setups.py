@@ -6,6 +6,7 @@ import numpy as np
 
 from controller_node.behaviours.factory import make_motion
 from controller_node.controller import Controller
+from controller_node.files_read import files_read
 from controller_node.parameters import (
     commanded_joints,
     describe_planner,
@@ -15,6 +16,7 @@ from controller_node.parameters import (
 from msgs_config.arrays import IntArray
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
+from msgs_config.digests import sha256_of
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.memory import MemoryFormat
 from msgs_config.messages.state import StampedState
@@ -32,6 +34,7 @@ class ControllerSetup:
     driven: IntArray  # the entries of the effort that it drives
     warnings: tuple[str, ...]
     keyframe_format: MemoryFormat
+    files: dict[str, str]  # SHA-256 of those that were read, by the parameter
 
 
 def make_setup(character: Character, values: Values) -> ControllerSetup:
@@ -51,6 +54,7 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
         driven=np.flatnonzero(character.layout.mask(joints)),
         warnings=(*motion.warnings, *describe_planner(character, values)),
         keyframe_format=MemoryFormat(*controller.parts),
+        files={name: sha256_of(path) for name, path in files_read(character, values).items()},
     )
 
 

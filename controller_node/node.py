@@ -126,9 +126,15 @@ class ControllerNode(ComposableNode):
     def _publish_configuration(self) -> None:
         """Publish the parameters in force, and since which state they are."""
         since_ns = None if self._last_reply is None else self._last_reply.state.stamp_ns
-        actuation = describe_actuation(len(self._setups.in_force.driven), self._layout.size)
+        setup = self._setups.in_force
         self._outputs.publish_configuration(
-            configuration.describe(self._character, self._values, since_ns, actuation=actuation)
+            configuration.describe(
+                self._character,
+                self._values,
+                since_ns,
+                actuation=describe_actuation(len(setup.driven), self._layout.size),
+                files=setup.files,
+            )
         )
 
     def _publish_first_state(self) -> None:

@@ -19,7 +19,7 @@ from msgs_config.memory import is_own
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import decode_string
 from msgs_config.messages.clock import TickClock
-from msgs_config.messages.configuration import SINCE
+from msgs_config.messages.configuration import FILES, SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.keyframe import decode_keyframe
 from msgs_config.messages.session import ANONYMOUS, read_session
@@ -246,8 +246,8 @@ class CharacterTimeline:
         with suppress(*_UNREADABLE_JSON):
             content = json.loads(text)
             parameters = dict(content["parameters"])
-            since_ns = content.get(SINCE)
-            self.controller.append(NodeParameters(parameters, since_ns))
+            files = dict(content.get(FILES, {}))
+            self.controller.append(NodeParameters(parameters, content.get(SINCE), files))
 
     def _take_keyframe(self, raw: bytes, published_ns: int) -> None:
         if self.states.stamps_ns[1:2]:  # that of the first state is there; no other is needed

@@ -1,8 +1,8 @@
 """The parameters of recorded nodes, as they were in force one after another."""
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from actuated_characters.bags.rebuilding import Rebuilt, rebuild
@@ -19,6 +19,7 @@ class NodeParameters:
 
     parameters: dict[str, Any]
     after_stamp_ns: int | None  # in force for states after that stamp; None: from the start
+    files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 by the parameter's name
 
 
 def in_force(settings: Sequence[NodeParameters], stamp_ns: int) -> dict[str, Any]:

@@ -191,7 +191,16 @@ def _print_comparison(
     elif options.set:  # with --set the answers are to differ
         print(f"first difference: {first}")
     else:
-        raise _difference_error(options.bag, [recording], first)
+        raise _difference_error(
+            options.bag, [recording], first, *_changed_files(options, recording)
+        )
+
+
+def _changed_files(options: argparse.Namespace, recording: "Recording") -> list[str]:
+    """What of a controller that was started here is not as it was when it was recorded."""
+    from actuated_characters.replay.players.controller_parameters import changed_files
+
+    return [] if options.no_start else changed_files(recording)
 
 
 def _joint_table(comparison: "CommandComparison") -> Table:
@@ -216,12 +225,12 @@ def _check_result(
 
 
 def _difference_error(
-    bag: Path, recordings: "Sequence[Recording]", difference: object
+    bag: Path, recordings: "Sequence[Recording]", difference: object, *causes: str
 ) -> ReplayError:
     """An error of one line: the first difference, and the versions that are not the recorded."""
     present = installed_versions()
     changes = dict.fromkeys(describe_changes(each.versions, present) for each in recordings)
-    return ReplayError("; ".join(filter(None, [f"{bag}: {difference}", *changes])))
+    return ReplayError("; ".join(filter(None, [f"{bag}: {difference}", *causes, *changes])))
 
 
 def _verdict(

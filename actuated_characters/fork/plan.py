@@ -18,7 +18,7 @@ from actuated_characters.metrics.state_hash import hash_of_states
 from actuated_characters.recorder.forked_from import ForkedFrom
 from actuated_characters.recorder.run_directory import read_metrics
 from actuated_characters.replay.comparison import clock_of, first_tick_of
-from actuated_characters.replay.players.controller_parameters import first_parameters
+from actuated_characters.replay.players.controller_parameters import changed_files, first_parameters
 from actuated_characters.replay.world import check_keyframe, simulator_values
 from actuated_characters.runs.plan import RunPlan, count_ticks
 from actuated_characters.runs.planned.files import Planned
@@ -124,7 +124,7 @@ def plan_fork(
         },
         sensors=_recorded_sensors(path, recording),
         skipped=past.skipped,
-        warnings=warnings,
+        warnings=[f"warning: {each}" for each in changed_files(recording)] + list(warnings),
     )
 
 

@@ -96,16 +96,36 @@ def describe_planner(character: Character, values: Values, gains: GainArrays) ->
     return (f"the policy was trained with other {', '.join(others)}: it may fall where it did not",)
 
 
-def _read_policy(character: Character, values: Values) -> "Policy":
-    """The policy that the parameters' values say, at this controller's rate.
+def policy_path(values: Values) -> Path:
+    """The file of the policy that the parameters' values say.
 
-    Without a name it is the shipped one of the clip that is tracked, or of what is steered.
+    Raises:
+        ConfigurationError: there is none.
     """
-    from controller_node.planner.policy.file import STEERED, read_policy, shipped_policies
+    from controller_node.planner.policy.file import find_policy
+
+    return find_policy(_policy_name(values))
+
+
+def _policy_name(values: Values) -> str:
+    """Without one it is the shipped one of the clip that is tracked, or of what is steered."""
+    from controller_node.planner.policy.file import shipped_policies
+
+    motion = _motion_name(values)
+    return PlannerParameters.of(values).policy or (motion if motion in shipped_policies() else "")
+
+
+def _motion_name(values: Values) -> str:
+    reference = MotionSettings.of(values).reference
+    return ClipSettings.of(values).clip if reference == "clip" else reference
+
+
+def _read_policy(character: Character, values: Values) -> "Policy":
+    """The policy that the parameters' values say, at this controller's rate."""
+    from controller_node.planner.policy.file import STEERED, read_policy
 
     given, reference = PlannerParameters.of(values), MotionSettings.of(values).reference
-    motion = ClipSettings.of(values).clip if reference == "clip" else reference
-    name = given.policy or (motion if motion in shipped_policies() else "")
+    motion, name = _motion_name(values), _policy_name(values)
     policy = read_policy(name, character)
     if policy.rate_hz != given.rate_hz:
         raise ConfigurationError(

@@ -124,12 +124,15 @@ class KeyframesSettings(Settings):
 
 @REFERENCES.register("keyframes", KeyframesSettings)
 def _keyframes(character: Character, values: Values) -> Motion:
-    keyframes = read_keyframes(character, str(_path(KeyframesSettings.of(values).keyframes)))
+    keyframes = read_keyframes(
+        character, str(keyframes_path(KeyframesSettings.of(values).keyframes))
+    )
     reference = KeyframesReference(character.layout, keyframes)
     return Motion(reference, overshoots(character, keyframes))
 
 
-def _path(name_or_path: str) -> Path:
+def keyframes_path(name_or_path: str) -> Path:
+    """The file of shipped keyframes, or the path itself. Raises MotionError if there are none."""
     refuse_other_kind(Path(name_or_path), "a file of keyframes (.yaml)", _FILES, MotionError)
     if name_or_path.endswith(_FILES):
         return Path(name_or_path)

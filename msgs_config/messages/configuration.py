@@ -22,6 +22,8 @@ from msgs_config.versions import installed_versions, read_versions
 _CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and meshes
 SINCE = "parameters_after_stamp_ns"
 """The key of the stamp of the last state before the parameters were in force; null at first."""
+FILES = "files"
+"""The key of SHA-256 of the files that a controller has read, by the parameters that name them."""
 _TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
 
 
@@ -32,6 +34,7 @@ def describe(
     probe: DynamicsSample | None = None,
     terrain: UrdfOptions | None = None,
     actuation: Mapping[str, int | bool] | None = None,
+    files: Mapping[str, str] | None = None,
     name: str = "",
     characters: Sequence[str] = (),
     session: str = ANONYMOUS,
@@ -39,8 +42,9 @@ def describe(
     """The JSON text: the character with its files, the parameters in force, and the versions.
 
     `since_ns` is the stamp of the last state with other parameters; `probe` and `terrain` are a
-    simulator's, `actuation` a controller's. `name` is the character's among several,
-    `characters` in their world's order. `session`, the simulator's, is no parameter here.
+    simulator's, `actuation` a controller's, and so are `files`, SHA-256 of what it has read by the
+    parameters that name it. `name` is the character's among several, `characters` in their
+    world's order. `session`, the simulator's, is no parameter here.
 
     Raises:
         CharacterError: a mesh of the character or of the terrain cannot be read.
@@ -60,6 +64,7 @@ def describe(
         **_describe_urdf(_TERRAIN, terrain),
         "probe": None if probe is None else probe.content(),
         "actuation": None if actuation is None else dict(actuation),
+        FILES: dict(files or {}),
         SINCE: since_ns,
         "parameters": {key: _finite(values[key]) for key in values if key != SESSION.name},
         "versions": installed_versions(),

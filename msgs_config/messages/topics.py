@@ -400,7 +400,8 @@ CONTROLLER_CONFIGURATION = Topic(
     LATCHED,
     "controller_node → all",
     nodes=(CONTROLLER_NODE,),
-    content="the same of the controller; again at each change of its parameters",
+    content="the same of the controller, and SHA-256 of the files that it has read; again at each "
+    "change of its parameters",
 )
 _KEYFRAME = Topic(
     "~/keyframe",

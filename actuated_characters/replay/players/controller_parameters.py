@@ -2,9 +2,14 @@
 
 import math
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 from typing import Any
 
+from actuated_characters.bags.node_parameters import NodeParameters
 from actuated_characters.bags.recording import Recording
+from controller_node.files_read import files_read
+from controller_node.parameters import resolve_for
+from msgs_config.digests import sha256_of
 from msgs_config.errors import RecordingError
 from msgs_config.messages import topics
 from sim_node.initial_state import INITIAL_STATE, POSITION, VELOCITY
@@ -19,6 +24,28 @@ def first_parameters(recording: Recording) -> dict[str, Any]:
     Raises:
         RecordingError: the bag does not have them.
     """
+    return _known(_first(recording).parameters)
+
+
+def changed_files(recording: Recording) -> list[str]:
+    """A sentence for each file of a recording's controller that is not what it was.
+
+    A file that is not there is left to who reads it.
+
+    Raises:
+        RecordingError: the bag does not have the controller's parameters.
+    """
+    settings = _first(recording)
+    values = resolve_for(recording.character, _known(settings.parameters))
+    sentences = []
+    for name, path in files_read(recording.character, values).items():
+        with suppress(OSError):
+            if settings.files.get(name, "") not in ("", sha256_of(path)):
+                sentences.append(f"{name} {path} is not the file that it was: its content differs")
+    return sentences
+
+
+def _first(recording: Recording) -> NodeParameters:
     if not recording.controller:
         raise RecordingError(
             "the recording has nothing on 'controller_node/configuration', so its controller "
@@ -30,7 +57,7 @@ def first_parameters(recording: Recording) -> dict[str, Any]:
         for number, settings in enumerate(recording.controller)
         if number == 0 or settings.after_stamp_ns is None or settings.after_stamp_ns < first_ns
     ]
-    return _known(before[-1].parameters)
+    return before[-1]
 
 
 def parameter_changes(

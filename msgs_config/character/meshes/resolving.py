@@ -1,10 +1,8 @@
 """The mesh files of a URDF: found by their names, which are made absolute."""
 
-import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from copy import deepcopy
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
@@ -12,6 +10,7 @@ from xml.etree import ElementTree
 
 from msgs_config import files
 from msgs_config.character.model import UrdfOptions
+from msgs_config.digests import sha256_of
 from msgs_config.errors import CharacterError
 
 MAX_MESH_BYTES = 64 * 1024 * 1024
@@ -81,17 +80,9 @@ def check_collision_meshes(loading: UrdfOptions, known: Mapping[str, str]) -> No
 
 def _hash_of(path: Path) -> str:
     try:
-        status = path.stat()
-        return _hash_of_version(path, status.st_mtime_ns, status.st_size)
+        return sha256_of(path)  # a node says it again when its parameters change
     except OSError as error:
         raise CharacterError(f"mesh {path}: {error.strerror}") from error
-
-
-@cache
-def _hash_of_version(path: Path, modified_ns: int, size: int) -> str:
-    """Once for each version of a file: a node says it again when its parameters change."""
-    del modified_ns, size
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _find(name: str, urdf: Path) -> Path:
