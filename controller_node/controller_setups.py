@@ -34,7 +34,7 @@ class ControllerSetup:
     driven: IntArray  # the entries of the effort that it drives
     warnings: tuple[str, ...]
     keyframe_format: MemoryFormat
-    files: dict[str, str]  # SHA-256 of those that were read, by the parameter
+    files: dict[str, str]  # SHA-256 of those that were read, see `files_read`
 
 
 def make_setup(character: Character, values: Values) -> ControllerSetup:

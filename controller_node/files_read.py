@@ -1,34 +1,62 @@
 """The files that a controller's parameters name: what it does depends on their content."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from controller_node.behaviours.factory import BehaviourSettings
+from controller_node.behaviours.motion_library import clips_of_library
+from controller_node.behaviours.pursuit import PursuitSettings
+from controller_node.behaviours.settings import REACTIONS, ReactionSettings
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
+from controller_node.controller_settings import LawSettings
 from controller_node.planner.factory import policy_path
 from controller_node.planner.settings import HYBRID, POLICY, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
 from controller_node.references.keyframes import KeyframesSettings, keyframes_path
+from controller_node.references.steering.factory import GaitSettings, clips_of_gait
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import clip_path
 from msgs_config.parameters import Values
 
 
 def files_read(character: Character, values: Values) -> dict[str, Path]:
-    """The files in use, by the names of the parameters that name them.
+    """The files in use, by the names that the parameters have for them.
 
     Raises:
         ActuatedCharactersError: there is no such clip, machine, policy, or file of keyframes.
     """
-    files: dict[str, Path] = {}
-    reference = MotionSettings.of(values).reference
-    if reference == "clip":
-        files["clip"] = clip_path(character, ClipSettings.of(values).clip)
-    elif reference == "keyframes":
+    behaviour, files = BehaviourSettings.of(values).behaviour, dict[str, Path]()
+    for name in (*_reference_clips(character, values), *_behaviour_clips(character, values)):
+        files[f"clip {name}"] = clip_path(character, name)
+    if MotionSettings.of(values).reference == "keyframes":
         files["keyframes"] = keyframes_path(KeyframesSettings.of(values).keyframes)
-    if BehaviourSettings.of(values).behaviour == STATE_MACHINE:
+    if behaviour == STATE_MACHINE:
         files["machine"] = machine_path(MachineSettings.of(values).machine)
     if PlannerParameters.of(values).planner in (POLICY, HYBRID):
         files["policy"] = policy_path(values)
+    if feedforward := LawSettings.of(values).feedforward:
+        files["feedforward"] = Path(feedforward)
     return files
+
+
+def _reference_clips(character: Character, values: Values) -> Sequence[str]:
+    reference = MotionSettings.of(values).reference
+    if reference == "steered":
+        return clips_of_gait(character, GaitSettings.of(values))
+    return [ClipSettings.of(values).clip] if reference == "clip" else []
+
+
+def _behaviour_clips(character: Character, values: Values) -> Sequence[str]:
+    behaviour = BehaviourSettings.of(values).behaviour
+    if behaviour not in REACTIONS:
+        return []
+    settings, clips = ReactionSettings.of(values), list[str]()
+    if behaviour == "reactive":
+        clips += clips_of_library(character, settings.library)
+    if settings.by_clip:
+        clips += settings.face_up, settings.face_down
+    if behaviour == "pursuit" and (strikes := PursuitSettings.of(values).strikes):
+        clips += clips_of_library(character, strikes)
+    return clips

@@ -19,7 +19,9 @@ class NodeParameters:
 
     parameters: dict[str, Any]
     after_stamp_ns: int | None  # in force for states after that stamp; None: from the start
-    files: Mapping[str, str] = field(default_factory=dict)  # SHA-256 by the parameter's name
+    files: Mapping[str, str] = field(
+        default_factory=dict
+    )  # SHA-256 of what was read, by the parameters' names
 
 
 def in_force(settings: Sequence[NodeParameters], stamp_ns: int) -> dict[str, Any]:

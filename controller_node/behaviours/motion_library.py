@@ -70,7 +70,7 @@ class MotionLibrary:
             ConfigurationError: a clip does not exist, or no moment is left.
             ClipError: a clip is malformed.
         """
-        names = _names(character, clips)
+        names = clips_of_library(character, clips)
         self._layout = character.layout
         self._model = DynamicsModel(character)
         masses = np.array([link.mass for link in character.links])
@@ -202,7 +202,13 @@ def _from_below(origins: FloatArray, turns_xyzw: FloatArray, root: FloatArray) -
     return Window(origins - below[..., np.newaxis, np.newaxis, :], turns_xyzw)
 
 
-def _names(character: Character, clips: Sequence[str]) -> list[str]:
+def clips_of_library(character: Character, clips: Sequence[str]) -> list[str]:
+    """The clips that are named, those of folders in their place; all if none is.
+
+    Raises:
+        ConfigurationError: one does not exist, or the character has none.
+        ClipError: a folder has none.
+    """
     available = available_clips(character)
     if not available:
         raise ConfigurationError(

@@ -9,7 +9,8 @@ from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 
-_TELLS_HITS = ("active_ragdoll", "pursuit", "reactive")
+REACTIONS = ("active_ragdoll", "pursuit", "reactive")
+"""The behaviours that tell hits, and react to them."""
 
 
 class ReactionSettings(Settings):
@@ -89,7 +90,7 @@ def check_terrain(behaviour: str, terrain: object) -> None:
 
     It knows the plane at z = 0 alone. `terrain` is the simulator's parameter, None if unknown.
     """
-    if behaviour in _TELLS_HITS and terrain not in (None, PLANE, NO_GROUND):
+    if behaviour in REACTIONS and terrain not in (None, PLANE, NO_GROUND):
         raise ConfigurationError(
             f"parameter 'behaviour' is {behaviour}, which tells a hit from the ground at z = 0, "
             f"but sim_node's 'terrain' is {terrain}; it must be {PLANE} or {NO_GROUND}"

@@ -23,7 +23,7 @@ _CHARACTER = ("urdf", "urdf_path", "meshes")  # keys of a URDF's text, path and 
 SINCE = "parameters_after_stamp_ns"
 """The key of the stamp of the last state before the parameters were in force; null at first."""
 FILES = "files"
-"""The key of SHA-256 of the files that a controller has read, by the parameters that name them."""
+"""The key of SHA-256 of the files that a controller has read, by the parameters' names for them."""
 _TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
 
 
@@ -43,7 +43,7 @@ def describe(
 
     `since_ns` is the stamp of the last state with other parameters; `probe` and `terrain` are a
     simulator's, `actuation` a controller's, and so are `files`, SHA-256 of what it has read by the
-    parameters that name it. `name` is the character's among several, `characters` in their
+    parameters' names for it. `name` is the character's among several, `characters` in their
     world's order. `session`, the simulator's, is no parameter here.
 
     Raises:

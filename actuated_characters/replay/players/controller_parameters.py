@@ -41,7 +41,7 @@ def changed_files(recording: Recording) -> list[str]:
     for name, path in files_read(recording.character, values).items():
         with suppress(OSError):
             if settings.files.get(name, "") not in ("", sha256_of(path)):
-                sentences.append(f"{name} {path} is not the file that it was: its content differs")
+                sentences.append(f"{path} is not the file that it was: its content differs")
     return sentences
 
 

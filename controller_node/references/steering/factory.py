@@ -26,6 +26,11 @@ class GaitSettings(Settings, prefix="steering."):
     )
 
 
+def clips_of_gait(character: Character, gait: GaitSettings) -> list[str]:
+    """The clips to move by. Raises ClipError if one does not exist, or a folder has none."""
+    return expand_clips(character, gait.clips) or [gait.walk, gait.run]
+
+
 @REFERENCES.register("steered", GaitSettings, SteeringLimits)
 def _steered(character: Character, values: Values) -> Motion:
     if not character.layout.has_floating_base:
@@ -33,7 +38,7 @@ def _steered(character: Character, values: Values) -> Motion:
             f"reference 'steered' needs a floating base; '{character.name}' is fixed to the world"
         )
     gait = GaitSettings.of(values)
-    names = expand_clips(character, gait.clips) or [gait.walk, gait.run]
+    names = clips_of_gait(character, gait)
     clamped: list[str] = []
     cycles = []
     for name in names:

@@ -9,12 +9,18 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
 from actuated_characters.replay.players.controller_parameters import changed_files
 from controller_node import parameters
+from controller_node.controller_setups import make_setup
 from controller_node.files_read import files_read
 from msgs_config.digests import sha256_of
 from msgs_config.errors import ActuatedCharactersError
 from tests.support.physics import character
 
 KEYS = "keyframes:\n- {time: 0.0, pose: {hinge: 0.0}}\n- {time: 0.5, pose: {hinge: %s}}\n"
+GAIT = {"clip walk": "humanoid3d_walk.txt", "clip run": "humanoid3d_run.txt"}
+GET_UPS = {
+    "clip getup_faceup": "humanoid3d_getup_faceup.txt",
+    "clip getup_facedown": "humanoid3d_getup_facedown.txt",
+}
 
 
 @pytest.fixture
@@ -37,7 +43,7 @@ def test_a_fork_and_a_replay_say_that_keyframes_are_others(
     run: Path, keys: Path, domain: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     del domain  # the nodes inherit it
-    said = f"keyframes {keys} is not the file that it was: its content differs"
+    said = f"{keys} is not the file that it was: its content differs"
     assert changed_files(read_recording(run)) == []
     assert main(["fork", str(run), "--at", "0.1"]) == 0
     assert "is not the file" not in capsys.readouterr().out
@@ -67,30 +73,50 @@ def test_a_bag_that_names_no_files_says_nothing(run: Path, keys: Path) -> None:
     ("given", "names"),
     [
         ({"reference": "hold", "planner": "none"}, {}),
-        ({"reference": "clip", "clip": "kick"}, {"clip": "humanoid3d_kick.txt"}),
+        ({"reference": "clip", "clip": "kick"}, {"clip kick": "humanoid3d_kick.txt"}),
+        ({"law": "feedforward", "feedforward": "{efforts}"}, {"feedforward": "efforts.csv"}),
         (
             {"reference": "keyframes", "keyframes": "humanoid_stand"},
             {"keyframes": "humanoid_stand.yaml"},
         ),
         (
             {"reference": "steered", "behaviour": "state_machine", "machine": "run"},
-            {"machine": "run.yaml"},
+            {**GAIT, "machine": "run.yaml"},
         ),
         (
             {"reference": "clip", "clip": "walk", "planner": "hybrid"},
-            {"clip": "humanoid3d_walk.txt", "policy": "walk.npz"},
+            {"clip walk": "humanoid3d_walk.txt", "policy": "walk.npz"},
         ),
         (
-            {"reference": "clip", "clip": "walk", "planner": "policy", "policy": "run"},
-            {"clip": "humanoid3d_walk.txt", "policy": "run.npz"},
+            {"reference": "clip", "clip": "walk", "planner": "policy", "policy": "walk"},
+            {"clip walk": "humanoid3d_walk.txt", "policy": "walk.npz"},
+        ),
+        ({"reference": "steered", "steering.clips": ["run"]}, {"clip run": "humanoid3d_run.txt"}),
+        ({"behaviour": "active_ragdoll"}, GET_UPS),
+        ({"behaviour": "active_ragdoll", "recovery": "ramp", "library": ["kick"]}, {}),
+        (
+            {"behaviour": "reactive", "library": ["kick"]},
+            {"clip kick": "humanoid3d_kick.txt", **GET_UPS},
+        ),
+        (
+            {"behaviour": "pursuit", "opponent": "other", "strike.clips": ["punch"]},
+            {**GET_UPS, "clip punch": "humanoid3d_punch.txt"},
         ),
     ],
 )
-def test_a_controller_reads_what_is_in_use(given: dict[str, str], names: dict[str, str]) -> None:
-    humanoid = character("humanoid")
-    files = files_read(humanoid, parameters.resolve_for(humanoid, given))
+def test_a_controller_reads_what_is_in_use(
+    given: dict[str, object], names: dict[str, str], tmp_path: Path
+) -> None:
+    humanoid, efforts = character("humanoid"), tmp_path / "efforts.csv"
+    efforts.write_text("time_s\n0\n", encoding="utf-8")
+    if "feedforward" in given:
+        given = {**given, "feedforward": str(efforts)}
+
+    setup = make_setup(humanoid, parameters.resolve_for(humanoid, given))
+
+    files = files_read(humanoid, setup.values)
     assert {name: path.name for name, path in files.items()} == names
-    assert all(path.is_file() for path in files.values())
+    assert setup.files == {name: sha256_of(path) for name, path in files.items()}
 
 
 def test_a_policy_that_is_not_there_is_an_error() -> None:
