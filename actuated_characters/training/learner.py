@@ -21,8 +21,6 @@ _MEAN_KEEPS, _SQUARE_KEEPS, _LEAST_ROOT = 0.9, 0.999, 1e-8  # Adam's
 _LOG_RATIO_MOST = 20.0
 _VALUE_RATE = 1e-3
 _VALUE_WEIGHT = 4.0
-_RATES = (2e-5, 1e-3)  # between which the policy's rate is led by how much a policy changes
-_TOO_FAR = 3.0  # times the divergence that is aimed at, at which a policy learns no more of a trace
 _LEAST_CALM = 1e-3
 _FALLS_SOON = 30  # decisions, 1 s: a state from which it falls so soon is not calm
 _OVER_WEIGHT = np.float32(0.1)  # of means beyond the largest action
@@ -118,7 +116,6 @@ class Learner:
         self.policy = make_network((inputs, hidden, hidden, actions), 0.01, rng)
         self.value = make_network((inputs, hidden // 2, hidden // 2, 1), 0.1, rng)
         self._policy_steps, self._value_steps = Adam(self.policy), Adam(self.value)
-        self._rate = 3e-4
         self._threads = ThreadPoolExecutor(1)
 
     def take(self, policy: Network, value: Network) -> None:
@@ -131,18 +128,16 @@ class Learner:
         """End its thread."""
         self._threads.shutdown()
 
-    def learn(self, trace: Trace, noise: SingleArray, spread: float, aim: float) -> float:
-        """Learn from a trace (worlds, decisions); how far the policy is from the one before.
+    def learn(self, trace: Trace, noise: SingleArray, spread: float, rate: float) -> None:
+        """Learn from a trace (worlds, decisions), by steps of the policy of a rate.
 
-        `noise` (worlds, decisions, a) are the draws that were added to its actions, by `spread`;
-        `aim` is the divergence from the policy before that is aimed at.
+        `noise` (worlds, decisions, a) are the draws that were added to its actions, by `spread`.
         """
         lesson = self._lesson(trace, noise)
         orders = [self._rng.permutation(len(lesson.values)) for _ in range(self._settings.passes)]
         valuing = self._threads.submit(self._learn_value, lesson, orders)
-        divergence = self._learn_policy(lesson, orders, np.float32(1.0 / spread), aim)
+        self._learn_policy(lesson, orders, np.float32(1.0 / spread), rate)
         valuing.result()
-        return divergence
 
     def _lesson(self, trace: Trace, noise: SingleArray) -> Lesson:
         settings = self._settings
@@ -202,29 +197,17 @@ class Learner:
             self._value_steps.step(self.value, gradient, _VALUE_RATE)
 
     def _learn_policy(
-        self, lesson: Lesson, orders: Sequence[IntArray], inverse: np.float32, aim: float
-    ) -> float:
-        divergences = list[float]()
-        parts = self._parts(orders)
-        each_pass = len(parts) // len(orders)
-        for number, part in enumerate(parts):
-            if number % each_pass == 0 and divergences and divergences[-1] > _TOO_FAR * aim:
-                break
+        self, lesson: Lesson, orders: Sequence[IntArray], inverse: np.float32, rate: float
+    ) -> None:
+        for part in self._parts(orders):
             found, cache = forward(self.policy, lesson.observations[part])
-            slope, divergence = self._slope(lesson, part, found, inverse)
-            divergences.append(divergence)
-            self._policy_steps.step(self.policy, backward(self.policy, cache, slope), self._rate)
-        last = float(np.mean(divergences[-each_pass:]))
-        if last > 1.5 * aim:
-            self._rate = max(self._rate / 1.3, _RATES[0])
-        elif last < 0.67 * aim:
-            self._rate = min(self._rate * 1.2, _RATES[1])
-        return last
+            slope = self._slope(lesson, part, found, inverse)
+            self._policy_steps.step(self.policy, backward(self.policy, cache, slope), rate)
 
     def _slope(
         self, lesson: Lesson, part: IntArray, means: SingleArray, inverse: np.float32
-    ) -> tuple[SingleArray, float]:
-        """The slope (m, a) of the clipped objective at the means, and the divergence so far."""
+    ) -> SingleArray:
+        """The slope (m, a) of the clipped objective at the means."""
         settings, advantage = self._settings, lesson.advantages[part]
         off = (lesson.actions[part] - means) * inverse
         log_ratio = (-0.5 * off * off).sum(1) - lesson.chances[part]
@@ -236,4 +219,5 @@ class Learner:
         slope = counts[:, np.newaxis] * off * inverse
         over = np.abs(means) - np.float32(settings.largest)
         slope += _OVER_WEIGHT / np.float32(len(part)) * np.maximum(over, 0.0) * np.sign(means)
-        return slope.astype(np.float32), float((ratio - 1.0 - log_ratio).mean())
+        single: SingleArray = slope.astype(np.float32)
+        return single

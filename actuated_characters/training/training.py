@@ -18,8 +18,8 @@ from msgs_config.arrays import FloatArray
 
 _WORLDS, _DECISIONS = 64, 48  # of a trace
 _SPREADS = (0.35, 0.12)  # standard deviation of what is tried, at first and in the end
-_FIRST_SPREAD_FROM = 0.2  # at first where it begins with what another policy can
-_DIVERGENCES = (0.03, 0.008)  # of a policy from the one before, at first and in the end
+_RATES = (1.2e-3, 2e-4)  # of a policy's steps, at first and in the end
+_FROM = 0.5  # of that course, from where on it goes where it begins with what another policy can
 _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
 _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
 _GROWS, _SHRINKS = 0.15, 0.1  # N s a trace
@@ -56,13 +56,11 @@ class Training:
         """
         self._job = job
         self._done = decisions_of(start) if start and resumes else 0
-        self._first_spread, self._from = _SPREADS[0], None
+        self._from = None
         if start is not None and resumes:
             self._from = start.about["trained"].get("from")
         elif start is not None:
             self._from = {"clips": start.about["clips"], "decisions": decisions_of(start)}
-        if self._from is not None:
-            self._first_spread = _FIRST_SPREAD_FROM
         self._worlds, self._judges = (
             TrainingWorlds(job.character, job.settings, job.gains, threads=job.threads)
             for _ in range(2)
@@ -117,11 +115,12 @@ class Training:
     def go_on(self) -> Progress:
         """Run episodes for a while, and learn from them."""
         share = min(self._done / self._job.decisions, 1.0)
-        spreads = self._first_spread, _SPREADS[1]
-        spread, aim = (first * (last / first) ** share for first, last in (spreads, _DIVERGENCES))
+        if self._from is not None:
+            share = _FROM + (1.0 - _FROM) * share
+        spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
-        self._learner.learn(trace, noise, spread, aim)
+        self._learner.learn(trace, noise, spread, rate)
         self._worlds.prefer_hard_starts(trace)
         self._done += trace.rewards.size
         self._lead_pushes(trace)

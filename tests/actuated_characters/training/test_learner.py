@@ -176,7 +176,7 @@ def test_the_slope_is_that_of_the_clipped_objective(learner: Learner) -> None:
         clipped = np.clip(ratio, 1 - settings.clip, 1 + settings.clip)
         return -float(np.minimum(ratio * lesson.advantages, clipped * lesson.advantages).mean())
 
-    slope, _ = learner._slope(lesson, part, means, 1.0 / spread)
+    slope = learner._slope(lesson, part, means, 1.0 / spread)
 
     assert np.abs(means).max() > settings.largest  # where another part of the slope pulls back
     for row in range(count):
@@ -206,11 +206,10 @@ def test_it_learns_what_pays(learner: Learner) -> None:
         rewards.append(float(-((means - target) ** 2).sum(-1).mean()))
         ends = np.full((count, 1), FELL)
         trace = Trace(observations, observations, actions, reward, reward, ends, ends, ends)
-        learner.learn(trace, noise, spread, 0.02)
+        learner.learn(trace, noise, spread, 1e-3)
 
     assert rewards[0] == pytest.approx(-1.25, abs=0.2)
-    assert rewards[-1] > -0.25
-    assert learner._rate <= module._RATES[1]
+    assert rewards[-1] > -0.05
 
 
 def least_of(learner: Learner, trace: Trace, lows: Mapping[tuple[int, int], int]) -> bool:
