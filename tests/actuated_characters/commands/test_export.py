@@ -162,7 +162,10 @@ def test_a_world_of_two_gives_both_and_bvh_one_of_them(
         (("walk", "--output", "walk.csv", "--topic", "/a"), ("--topic", "of a bag")),
         (("walk", "--output", "walk.onnx", "--topic", "/a"), ("--topic is of CSV and BVH",)),
         (("walk", "--output", "walk.onnx", "--character", "laikago"), ("does not fit 'laikago'",)),
-        (("wlak", "--output", "walk.onnx"), ("'wlak'", "getup_faceup, jump, run, walk")),
+        (
+            ("wlak", "--output", "walk.onnx"),
+            ("'wlak'", "getup_faceup, jump, kick, run, spinkick, walk"),
+        ),
         (("wlak", "--output", "walk.bvh"), ("wlak", "walk")),
         (("nowhere/run", "--output", "walk.bvh"), ("nowhere/run",)),
         (("nowhere.mcap", "--output", "walk.bvh"), ("nowhere.mcap",)),
