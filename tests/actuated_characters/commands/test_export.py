@@ -164,7 +164,7 @@ def test_a_world_of_two_gives_both_and_bvh_one_of_them(
         (("walk", "--output", "walk.onnx", "--character", "laikago"), ("does not fit 'laikago'",)),
         (
             ("wlak", "--output", "walk.onnx"),
-            ("'wlak'", "getup_faceup, jump, kick, run, spinkick, walk"),
+            ("'wlak'", "crawl, getup_facedown, getup_faceup, jump, kick, run, spinkick, walk"),
         ),
         (("wlak", "--output", "walk.bvh"), ("wlak", "walk")),
         (("nowhere/run", "--output", "walk.bvh"), ("nowhere/run",)),
