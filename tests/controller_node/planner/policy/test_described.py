@@ -16,7 +16,9 @@ def warnings(clip: str, planner: str = "policy", **controller: object) -> tuple[
 @pytest.mark.parametrize("planner", ["policy", "hybrid"])
 @pytest.mark.parametrize("name", shipped_policies())
 def test_a_shipped_policy_is_used_as_it_was_trained(name: str, planner: str) -> None:
-    assert warnings(name, planner) == ()
+    told = warnings(name, planner)  # of some clips, that they are kept within joint limits
+
+    assert not [each for each in told if "policy" in each]
 
 
 @pytest.mark.parametrize(

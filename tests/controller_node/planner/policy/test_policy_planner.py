@@ -361,7 +361,7 @@ REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
     "virtual forces": ("humanoid", {"balance.enabled": True}, "'balance.enabled' must be false"),
     "no policy": (
         "humanoid",
-        {"policy": "", "clip": "kick"},
+        {"policy": "", "clip": "roll"},
         "parameter 'policy' is ''; it must be the path of",
     ),
     "another clip": ("humanoid", {"clip": "run"}, "was trained on walk; the clip is run"),
