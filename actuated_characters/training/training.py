@@ -114,10 +114,7 @@ class Training:
 
     def go_on(self) -> Progress:
         """Run episodes for a while, and learn from them."""
-        share = min(self._done / self._job.decisions, 1.0)
-        if self._from is not None:
-            share = _FROM + (1.0 - _FROM) * share
-        spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
+        spread, rate = self._spread_and_rate()
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
         self._learner.learn(trace, noise, spread, rate)
@@ -152,6 +149,14 @@ class Training:
         }
         gains = job.gains.stiffness, job.gains.damping
         return Policy(about, network, value, self._scales, self._table.ahead, rules.unit, *gains)
+
+    def _spread_and_rate(self) -> tuple[float, float]:
+        """Of what is tried, and of the policy's steps, by how far the training is."""
+        share = min(self._done / self._job.decisions, 1.0)
+        if self._from is not None:
+            share = _FROM + (1.0 - _FROM) * share
+        spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
+        return spread, rate
 
     def _lead_pushes(self, trace: Trace) -> None:
         falls = float((trace.ends == FELL).mean()) / self._decision_s

@@ -117,6 +117,7 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     training = begin(job, walk)
     assert not training.has_best  # nothing of its own yet, that could replace a file
     first = looked_at(training).best({})
+    begun, half_way = begin()._spread_and_rate(), training._spread_and_rate()
     progress = training.go_on()
 
     for name, array in arrays_of(walk).items():
@@ -127,7 +128,9 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     assert first.about["trained"]["from"] == {"clips": ["walk"], "decisions": 50}
     again = looked_at(begin(replace(job, decisions=10**6), first, resumes=True))
     assert again.best({}).about["trained"]["from"] == {"clips": ["walk"], "decisions": 50}
-    assert again._first_spread == training._first_spread < begin()._first_spread
+    assert begun == (module._SPREADS[0], module._RATES[0])
+    assert half_way == pytest.approx(np.sqrt((module._SPREADS, module._RATES)).prod(axis=1))
+    assert again._spread_and_rate() == pytest.approx(half_way, rel=1e-3)
     assert first.scales.frame_mean.tobytes() == walk.scales.frame_mean.tobytes()
 
 
