@@ -122,9 +122,10 @@ def test_a_controller_reads_what_is_in_use(
 def test_a_policy_that_is_not_there_is_an_error() -> None:
     humanoid = character("humanoid")
     values = parameters.resolve_for(
-        humanoid, {"reference": "clip", "clip": "kick", "planner": "policy"}
+        humanoid,
+        {"reference": "clip", "clip": "kick", "planner": "policy", "policy": "nobody.npz"},
     )
-    with pytest.raises(ActuatedCharactersError, match="parameter 'policy' is ''"):
+    with pytest.raises(ActuatedCharactersError, match=r"parameter 'policy' is 'nobody\.npz'"):
         files_read(humanoid, values)
 
 
