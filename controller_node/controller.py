@@ -22,7 +22,7 @@ from controller_node.controller_settings import (
 )
 from controller_node.effort_series import EffortSeries
 from controller_node.model_check import check_agreement, check_inertia
-from controller_node.planner.base import Planner
+from controller_node.planner.base import Planner, TickState
 from controller_node.planner.outlook import Outlook
 from controller_node.references.base import Reference
 from controller_node.references.steering.reference import SteeredReference
@@ -235,7 +235,7 @@ class Controller:
             velocity=acting.velocity,
             now=self._tracked.desired(seen.time, seen.now),
             upcoming=self._tracked.desired(seen.next_time, seen.upcoming),
-            offset=self._offset(acting, gains),
+            offset=self._offset(acting, state, gains),
             effort=output.effort,
         )
         effort = self._effort(tracking, gains)
@@ -305,12 +305,14 @@ class Controller:
             self._limits = EffortLimits(self.layout, gains.effort_limits)
         return self._limits.clipped(effort)
 
-    def _offset(self, state: StampedState, gains: GainArrays) -> FloatArray | None:
+    def _offset(
+        self, acting: StampedState, seen: StampedState, gains: GainArrays
+    ) -> FloatArray | None:
         """The offset of a planner to the tracking errors (n,); None without."""
         if self.planner is None:
             return None
         if not gains.stiffness[6:].any():
             self.planner.rest()
             return None
-        tick = self._tracked.tick(state.stamp_ns)
-        return self.planner.offset(tick, state, gains, self._tracked.desired_at)
+        then, now = (TickState(self._tracked.tick(each.stamp_ns), each) for each in (acting, seen))
+        return self.planner.offset(then, now, gains, self._tracked.desired_at)

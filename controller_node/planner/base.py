@@ -1,6 +1,7 @@
 """What a controller asks of a planner."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from controller_node.control_laws import GainArrays
@@ -14,6 +15,14 @@ if TYPE_CHECKING:
 
 DesiredAt = Callable[[int], ReferenceState]
 """The desired state of a tick, counted from the episode's first state."""
+
+
+@dataclass(frozen=True)
+class TickState:
+    """A state, and its tick, counted from the episode's first state."""
+
+    tick: int
+    state: StampedState
 
 
 class Planner(Protocol):
@@ -44,6 +53,9 @@ class Planner(Protocol):
         """What is expected of the plan in force, the same object as long as it is."""
 
     def offset(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, acting: TickState, seen: TickState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
-        """What is added to the tracking errors (n,) of a state at a tick of the episode."""
+        """What is added to the tracking errors (n,) of the state in which it acts.
+
+        That is foreseen from the state that is seen, and the same where commands act at once.
+        """

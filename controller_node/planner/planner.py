@@ -19,7 +19,7 @@ import numpy as np
 
 from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor
-from controller_node.planner.base import DesiredAt
+from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.commands_in_flight import CommandsInFlight
 from controller_node.planner.compiled.anchoring import SOON
 from controller_node.planner.compiled.rollout import RolloutModel
@@ -164,16 +164,18 @@ class PredictivePlanner:
         self._guess = None
 
     def offset(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, acting: TickState, seen: TickState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         """What is added to the tracking errors (n,) of a state; zero for the root.
 
         Args:
-            tick: Of the state, since the episode began.
-            state: In which the offset acts.
+            acting: The state in which the offset acts, from which it plans.
+            seen: What that is foreseen from does not matter to it.
             gains: In force.
             desired_at: The reference.
         """
+        del seen
+        tick, state = acting.tick, acting.state
         self._forget_what_is_over(tick)
         self._take(tick)
         if self._plan is None:
@@ -200,7 +202,7 @@ class PredictivePlanner:
     ) -> float:
         """What a state costs against the reference where it is, without giving way.
 
-        The arguments are those of `offset`.
+        The arguments are of the state, as in `offset`.
         """
         body, position = self._model.body(gains), self._model.position_of(state.position)
         features = self._rollouts.features_of(position, state.velocity.copy(), body)

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.base import DesiredAt
+from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.outlook import Outlook
 from controller_node.references.offsets import RecordedPlan
 from msgs_config.arrays import FloatArray
-from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
@@ -46,8 +45,8 @@ class RecordedPlanner:
         """It goes on by the tick, whatever is tracked."""
 
     def offset(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, acting: TickState, seen: TickState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         """What is added to the tracking errors (n,) at a tick; zero for the root."""
-        del state, gains, desired_at
-        return np.concatenate((np.zeros(6), self._plan.at(tick)))
+        del seen, gains, desired_at
+        return np.concatenate((np.zeros(6), self._plan.at(acting.tick)))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from controller_node.control_laws import GainArrays
-from controller_node.planner.base import DesiredAt
+from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.planner import PredictivePlanner
 from controller_node.planner.policy.file import Policy
@@ -18,7 +18,6 @@ from controller_node.planner.policy.planner import PolicyPlanner
 from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
-from msgs_config.messages.state import StampedState
 
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
@@ -79,13 +78,13 @@ class HybridPlanner:
         self._looked = -1  # the last tick of a look
 
     def offset(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, acting: TickState, seen: TickState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
         """What is added to the tracking errors (n,) of a state; zero for the root.
 
         The arguments are those of `PredictivePlanner.offset`.
         """
-        given = tick, state, gains, desired_at
+        given, tick = (acting, seen, gains, desired_at), seen.tick
         if tick < self._looked:
             self.rest()  # a state of before, which comes once more
         is_due = self._looked < 0 or tick // self._hold > self._looked // self._hold
@@ -93,7 +92,9 @@ class HybridPlanner:
             self._looked = tick
         if self.plans:
             self._policy.anchor = self._predictive.anchor
-            if is_due and self._is_calm(tick, self._policy.expect(*given)):
+            if is_due and self._is_calm(
+                tick, self._policy.expect(tick, seen.state, gains, desired_at)
+            ):
                 self._hand_to_policy()
         if not self.plans:
             offset = self._policy.offset(*given)

@@ -13,7 +13,7 @@ import numpy as np
 
 from controller_node.control_laws import GainArrays
 from controller_node.planner.anchor import Anchor
-from controller_node.planner.base import DesiredAt
+from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.compiled.anchoring import SOON
 from controller_node.planner.compiled.network import evaluate
 from controller_node.planner.compiled.observation import (
@@ -107,10 +107,16 @@ class PolicyPlanner:
         """What the last decision expected: see `expect`."""
 
     def offset(
-        self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, acting: TickState, seen: TickState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
-        """What is added to the tracking errors (n,) of a state at a tick; zero for the root."""
-        hold = self._policy.hold
+        """What is added to the tracking errors (n,) of a state; zero for the root.
+
+        It decides from the state that is seen, though that is some ticks old when it acts: a small
+        part of a decision. What is foreseen is off where a foot lands, by tens of rad/s of an
+        ankle, and a policy that is told of it falls.
+        """
+        del acting
+        tick, state, hold = seen.tick, seen.state, self._policy.hold
         if self._offset is not None and tick < self._decided:
             self.rest()  # a state of before, which comes once more
         if self._offset is None or tick // hold > self._decided // hold:

@@ -13,6 +13,7 @@ from actuated_characters.training.rewards import cost_of
 from actuated_characters.training.starts import StartRange
 from actuated_characters.training.worlds import TrainingWorlds
 from controller_node.planner.anchor import Anchor
+from controller_node.planner.base import TickState
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.policy import planner as product
@@ -208,7 +209,8 @@ def test_training_and_product_see_the_same_and_give_way_alike(
         tick, model = number * rules.hold, stage.worlds.model
         assert stage.episode.counts.tolist() == [tick, number]
         state = StampedState(CLOCK.stamp_ns(tick), model.message_position(position), velocity, None)
-        offset = player.offset(tick, state, JOB.gains, reference.reference.desired_at)
+        at = TickState(tick, state)
+        offset = player.offset(at, at, JOB.gains, reference.reference.desired_at)
         if number == 3:  # 60 N s
             stage.episode.push[:] = 200.0, 400.0, round(0.134 * RATE)
         before = stage.anchor()

@@ -17,6 +17,7 @@ from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.wrenches import plan_push
 from controller_node.parameters import make_controller, make_controller_settings, resolve_for
 from controller_node.planner.anchor import Anchor
+from controller_node.planner.base import TickState
 from controller_node.planner.policy import hybrid as module
 from controller_node.planner.policy.hybrid import HybridPlanner
 from controller_node.references.factory import make_motion
@@ -68,7 +69,8 @@ def answer(planner: HybridPlanner, tick: int, slip: float = 0.0, moved: float = 
     velocity[1] += slip
     position[1] += moved
     sent = StampedState(CLOCK.stamp_ns(tick), position, velocity, None)
-    return planner.offset(tick, sent, GAINS, desired_at).tobytes()  # type: ignore[arg-type]
+    seen = TickState(tick, sent)
+    return planner.offset(seen, seen, GAINS, desired_at).tobytes()  # type: ignore[arg-type]
 
 
 def test_the_policy_leads_while_it_is_calm(planner: HybridPlanner) -> None:
@@ -82,7 +84,8 @@ def test_the_policy_leads_while_it_is_calm(planner: HybridPlanner) -> None:
         sent = StampedState(
             CLOCK.stamp_ns(tick), state.configuration.position, state.velocity, None
         )
-        alone = policy.offset(tick, sent, GAINS, desired_at)  # type: ignore[arg-type]
+        seen = TickState(tick, sent)
+        alone = policy.offset(seen, seen, GAINS, desired_at)  # type: ignore[arg-type]
         assert answer(planner, tick) == alone.tobytes()
         assert not planner.plans
     assert planner.outlook is not None

@@ -16,9 +16,11 @@ from actuated_characters.metrics.recording_metrics import plan_errors
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.wrenches import plan_push
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller, make_controller_settings, resolve_for
+from controller_node.planner.base import TickState
 from controller_node.planner.compiled.network import evaluate
 from controller_node.planner.compiled.observation import (
     find_deviation,
@@ -94,9 +96,10 @@ def offsets(
     """What a controller's planner answers states with."""
     planner = planner_of(controller)
     reference = make_motion(HUMANOID, resolve_for(HUMANOID, WALK)).reference
+    at = [TickState(tick, sent[tick]) for tick in ticks]
     return [
-        planner.offset(tick, sent[tick], GAINS, lambda each: reference.sample(each / 240)).tobytes()
-        for tick in ticks
+        planner.offset(seen, seen, GAINS, lambda each: reference.sample(each / 240)).tobytes()
+        for seen in at
     ]
 
 
@@ -224,18 +227,19 @@ def test_an_episode_forgets_all(make: Callable[..., Controller]) -> None:
 def test_another_reference_is_told_from_its_tick_on_and_the_decision_stays(
     make: Callable[..., Controller],
 ) -> None:
-    planner, sent = planner_of(make()), states(30)
+    planner = planner_of(make())
+    at = {tick: TickState(tick, state) for tick, state in enumerate(states(30))}
     walk = make_motion(HUMANOID, resolve_for(HUMANOID, WALK)).reference
     held = replace(walk.sample(0.0), velocity=np.zeros(N))
 
-    before = planner.offset(5, sent[5], GAINS, lambda tick: walk.sample(tick / 240))
+    before = planner.offset(at[5], at[5], GAINS, lambda tick: walk.sample(tick / 240))
     planner.change_reference(6)
-    stays = planner.offset(6, sent[6], GAINS, lambda tick: held)
-    after = planner.offset(8, sent[8], GAINS, lambda tick: held)
+    stays = planner.offset(at[6], at[6], GAINS, lambda tick: held)
+    after = planner.offset(at[8], at[8], GAINS, lambda tick: held)
 
     fresh = planner_of(make())
-    fresh.offset(5, sent[5], GAINS, lambda tick: walk.sample(tick / 240))
-    unchanged = fresh.offset(8, sent[8], GAINS, lambda tick: walk.sample(tick / 240))
+    fresh.offset(at[5], at[5], GAINS, lambda tick: walk.sample(tick / 240))
+    unchanged = fresh.offset(at[8], at[8], GAINS, lambda tick: walk.sample(tick / 240))
     assert stays.tobytes() == before.tobytes()
     assert after.tobytes() != unchanged.tobytes()
 
@@ -311,6 +315,28 @@ def test_commands_may_be_late(policy: str) -> None:
 
     assert late != at_once
     assert walked(policy, 0.1, {"command_delay_ticks": 2}) == late
+
+
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
+def test_it_bears_late_commands(engine: str) -> None:
+    late = {"command_delay_ticks": 2}
+    plan = make_plan("humanoid", 5.0, WALK, {"engine": engine, **late}, {"planner": "policy"})
+
+    (*_, last) = ticks_in_process(plan, [plan_push(plan, "root", (25.0, 0.0, 0.0), 1.0)])
+
+    assert last.following.position[2] > 0.7
+
+
+def test_it_decides_from_the_state_that_is_seen(make: Callable[..., Controller]) -> None:
+    planner = planner_of(make(command_delay_ticks=2))
+    walk = make_motion(HUMANOID, resolve_for(HUMANOID, WALK)).reference
+    sent = states(3)
+
+    found = planner.offset(
+        TickState(2, sent[2]), TickState(0, sent[0]), GAINS, lambda tick: walk.sample(tick / 240)
+    )
+
+    assert [found.tobytes()] == offsets(make(), sent, [0])
 
 
 def test_its_contacts_keep_their_points(policy: str) -> None:
