@@ -286,7 +286,7 @@ class Controller:
 
     def _change_reference(self, since: int = 0) -> None:
         if self.planner is not None:
-            self.planner.change_reference(since)
+            self.planner.change_reference(since, self._tracked.clip)
 
     def _effort(self, tracking: TrackingInput, gains: GainArrays) -> FloatArray:
         """The effort (n,) of law, behaviour and balance, within the limits; a follower has none."""

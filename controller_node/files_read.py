@@ -3,14 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from controller_node.behaviours.factory import BehaviourSettings
-from controller_node.behaviours.motion_library import clips_of_library
-from controller_node.behaviours.pursuit import PursuitSettings
-from controller_node.behaviours.settings import REACTIONS, ReactionSettings
+from controller_node.behaviours.factory import BehaviourSettings, behaviour_clips
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
 from controller_node.controller_settings import LawSettings
-from controller_node.planner.factory import policy_path
+from controller_node.planner.factory import policies_read
 from controller_node.planner.settings import HYBRID, POLICY, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -28,14 +25,14 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
         ActuatedCharactersError: there is no such clip, machine, policy, or file of keyframes.
     """
     behaviour, files = BehaviourSettings.of(values).behaviour, dict[str, Path]()
-    for name in (*_reference_clips(character, values), *_behaviour_clips(character, values)):
+    for name in (*_reference_clips(character, values), *behaviour_clips(character, values)):
         files[f"clip {name}"] = clip_path(character, name)
     if MotionSettings.of(values).reference == "keyframes":
         files["keyframes"] = keyframes_path(KeyframesSettings.of(values).keyframes)
     if behaviour == STATE_MACHINE:
         files["machine"] = machine_path(MachineSettings.of(values).machine)
     if PlannerParameters.of(values).planner in (POLICY, HYBRID):
-        files["policy"] = policy_path(values)
+        files |= policies_read(character, values, behaviour_clips(character, values))
     if feedforward := LawSettings.of(values).feedforward:
         files["feedforward"] = Path(feedforward)
     return files
@@ -46,17 +43,3 @@ def _reference_clips(character: Character, values: Values) -> Sequence[str]:
     if reference == "steered":
         return clips_of_gait(character, GaitSettings.of(values))
     return [ClipSettings.of(values).clip] if reference == "clip" else []
-
-
-def _behaviour_clips(character: Character, values: Values) -> Sequence[str]:
-    behaviour = BehaviourSettings.of(values).behaviour
-    if behaviour not in REACTIONS:
-        return []
-    settings, clips = ReactionSettings.of(values), list[str]()
-    if behaviour == "reactive":
-        clips += clips_of_library(character, settings.library)
-    if settings.by_clip:
-        clips += settings.face_up, settings.face_down
-    if behaviour == "pursuit" and (strikes := PursuitSettings.of(values).strikes):
-        clips += clips_of_library(character, strikes)
-    return clips

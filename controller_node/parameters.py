@@ -10,6 +10,7 @@ from controller_node.balance import BalanceGains
 from controller_node.behaviours.factory import (
     BEHAVIOUR_PARAMETERS,
     BehaviourSettings,
+    behaviour_clips,
     choose_behaviour,
 )
 from controller_node.behaviours.settings import check_terrain
@@ -201,13 +202,14 @@ def make_controller(character: Character, reference: Reference, values: Values) 
         gravity=shared.gravity,
         series=read_effort_series(character.layout, path) if path else None,
         behaviour=choose_behaviour(character, values),
-        planner=factory.make_planner(character, values),
+        planner=factory.make_planner(character, values, behaviour_clips(character, values)),
     )
 
 
 def describe_planner(character: Character, values: Values) -> tuple[str, ...]:
     """What the user should know of the planner that the parameters' values say."""
-    return factory.describe_planner(character, values, make_gains(character, values))
+    clips = behaviour_clips(character, values)
+    return factory.describe_planner(character, values, clips, make_gains(character, values))
 
 
 def check_world(values: Values, simulator: Mapping[str, object]) -> None:

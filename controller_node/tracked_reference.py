@@ -91,6 +91,11 @@ class TrackedReference:
         steered = self._reference
         return steered.course(tick) if isinstance(steered, SteeredReference) else None
 
+    @property
+    def clip(self) -> str:
+        """The clip that a behaviour has it go over to; empty: the reference itself."""
+        return "" if self.target is None else self.target.clip
+
     def own(self, tick: int) -> tuple[TimedState, TimedState]:
         """The reference's states at a tick and at the next one, without the behaviour's target."""
         return self._at(tick), self._at(tick + 1)

@@ -5,7 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from controller_node import parameters as controller_parameters
-from controller_node.behaviours.factory import BehaviourSettings, choose_behaviour, make_motion
+from controller_node.behaviours.factory import (
+    BehaviourSettings,
+    behaviour_clips,
+    choose_behaviour,
+    make_motion,
+)
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
@@ -169,7 +174,7 @@ def _controller_values(character: Character, given: Mapping[str, object]) -> tup
     values = controller_parameters.resolve_for(character, given)
     motion = make_motion(character, values)
     choose_behaviour(character, values)
-    check_planning(character, values)
+    check_planning(character, values, behaviour_clips(character, values))
     return values, motion
 
 

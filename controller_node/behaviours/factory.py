@@ -2,6 +2,9 @@
 
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
+from controller_node.behaviours.motion_library import clips_of_library
+from controller_node.behaviours.pursuit import PursuitSettings
+from controller_node.behaviours.settings import REACTIONS, ReactionSettings
 from controller_node.behaviours.state_machine import factory as state_machine
 from controller_node.planner.settings import NO_PLANNER, POLICY, RECORDED, PlannerParameters
 from controller_node.references import factory
@@ -50,9 +53,30 @@ def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
     return BEHAVIOURS[behaviour](character, values)
 
 
+def behaviour_clips(character: Character, values: Values) -> list[str]:
+    """The clips that the behaviour may go over to.
+
+    Raises:
+        ActuatedCharactersError: a name or a folder is wrong.
+    """
+    behaviour = BehaviourSettings.of(values).behaviour
+    if behaviour not in REACTIONS:
+        return []
+    settings, clips = ReactionSettings.of(values), list[str]()
+    if behaviour == "reactive":
+        clips += clips_of_library(character, settings.library)
+    if settings.by_clip:
+        clips += settings.face_up, settings.face_down
+    if behaviour == "pursuit" and (strikes := PursuitSettings.of(values).strikes):
+        clips += clips_of_library(character, strikes)
+    return list(dict.fromkeys(clips))
+
+
 def _check_planner(behaviour: str, planner: str) -> None:
-    if planner in (RECORDED, POLICY) and behaviour != "tracking":
+    if planner == RECORDED and behaviour != "tracking":
         wanted = "the behaviour tracking"
+    elif planner == POLICY and behaviour == state_machine.STATE_MACHINE:
+        wanted = "a behaviour that follows clips"
     elif planner != NO_PLANNER and behaviour == "ragdoll":
         wanted = "a behaviour that follows a motion"
     else:

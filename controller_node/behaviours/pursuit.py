@@ -118,7 +118,7 @@ class Pursuit(Reaction):
         offset = InertializationOffset(
             self._layout, moved.sample(seen.time), self._desired(seen), seen.time, _ONTO
         )
-        self._target = ClipTarget(moved, offset)
+        self._target = ClipTarget(clip, moved, offset)
         self._strike_until = seen.time + library.duration(clip)
         facts = {"to": "clip", "assistance": seen.assistance(), "clip": clip}
         self._begin(seen.time, Mode.BLEND, self._go_on_striking, self._phase_gains.firm, **facts)

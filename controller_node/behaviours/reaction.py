@@ -260,7 +260,7 @@ class Reaction:
         offset = InertializationOffset(
             self._layout, moved.sample(seen.time), self._desired(seen), seen.time, duration
         )
-        self._target = ClipTarget(moved, offset)
+        self._target = ClipTarget(match.clip, moved, offset)
 
     def _come_back(self, seen: Observation, carry: PlanarTransform, duration: float) -> None:
         """Go over to the own reference, carried."""

@@ -1,7 +1,7 @@
 """Targets of a reaction's phases; at a change an offset leads on from the target before."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
@@ -13,6 +13,11 @@ _NO_CARRY = PlanarTransform()
 
 class Target(Protocol):
     """The state to track over time, which may depend on the reference's own."""
+
+    @property
+    def clip(self) -> str:
+        """The clip of the library that it is of; empty: the reference, or no motion."""
+        ...
 
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The state to track at a time in s, where the reference has the state `own`."""
@@ -26,6 +31,7 @@ class ReferenceTarget:
     layout: JointLayout
     carry: PlanarTransform = _NO_CARRY
     offset: InertializationOffset | None = None
+    clip: ClassVar[str] = ""
 
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The reference's state, carried, with the rest of the offset."""
@@ -37,6 +43,7 @@ class ReferenceTarget:
 class ClipTarget:
     """A motion of the library."""
 
+    clip: str  # its name
     motion: TransformedReference
     offset: InertializationOffset
 
@@ -51,6 +58,7 @@ class CurrentStateTarget:
 
     state: ReferenceState  # kept up to date by its owner
     offset: InertializationOffset
+    clip: ClassVar[str] = ""
 
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The present state, with the rest of the offset."""

@@ -42,8 +42,11 @@ class Planner(Protocol):
     def begin_episode(self, episode: int) -> None:
         """Forget all; `episode` is the tick of the episode's first state."""
 
-    def change_reference(self, since: int = 0) -> None:
-        """Say that the reference is another one from a tick on."""
+    def change_reference(self, since: int = 0, clip: str = "") -> None:
+        """Say that the reference is another one from a tick on.
+
+        `clip` is the one that a behaviour has it go over to; empty: the own motion.
+        """
 
     def rest(self) -> None:
         """Say that nothing is tracked in this tick: what was planned is over."""

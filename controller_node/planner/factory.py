@@ -1,5 +1,6 @@
 """The planner that a controller's parameters say."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,10 +29,11 @@ from msgs_config.parameters import Values
 
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
+    from controller_node.planner.policy.choosing import Policies
     from controller_node.planner.policy.file import Policy
 
 
-def check_planning(character: Character, values: Values) -> None:
+def check_planning(character: Character, values: Values, clips: Sequence[str] = ()) -> None:
     """Raise ActuatedCharactersError as `make_planner`."""
     name = PlannerParameters.of(values).planner
     if name == NO_PLANNER:
@@ -41,13 +43,15 @@ def check_planning(character: Character, values: Values) -> None:
         _recorded_plan(character, values)
         return
     if name in (POLICY, HYBRID):
-        _read_policy(character, values)
+        _choose_policies(character, values, clips)
     if name in (PREDICTIVE, HYBRID):
         make_planner_settings(character, values)
 
 
-def make_planner(character: Character, values: Values) -> Planner | None:
+def make_planner(character: Character, values: Values, clips: Sequence[str] = ()) -> Planner | None:
     """The planner that the parameters' values say; None without one.
+
+    `clips` are those that a behaviour may go over to.
 
     Raises:
         ActuatedCharactersError: it cannot be had for the character, or beside the other values; or
@@ -62,27 +66,43 @@ def make_planner(character: Character, values: Values) -> Planner | None:
         plan = _recorded_plan(character, values)
         return RecordedPlanner(plan, make_commands_in_flight(character, given))
     if name == POLICY:
-        policy = _read_policy(character, values)
+        policies = _choose_policies(character, values, clips)
         from controller_node.planner.policy.planner import PolicyPlanner
 
-        return PolicyPlanner(character, policy, given, make_commands_in_flight(character, given))
+        return PolicyPlanner(character, policies, given, make_commands_in_flight(character, given))
     settings = make_planner_settings(character, values)
     if name == HYBRID:
-        policy = _read_policy(character, values)
+        policies = _choose_policies(character, values, clips)
         from controller_node.planner.policy.hybrid import HybridPlanner
 
-        return HybridPlanner(character, policy, settings)
+        return HybridPlanner(character, policies, settings)
     from controller_node.planner.planner import PredictivePlanner  # compiled code, for it alone
 
     return PredictivePlanner(character, settings)
 
 
-def describe_planner(character: Character, values: Values, gains: GainArrays) -> tuple[str, ...]:
+def describe_planner(
+    character: Character, values: Values, clips: Sequence[str], gains: GainArrays
+) -> tuple[str, ...]:
     """Where a policy is used otherwise than it was trained, which the user should read."""
     given = PlannerParameters.of(values)
     if given.planner not in (POLICY, HYBRID):
         return ()
-    policy = _read_policy(character, values)
+    policies = _choose_policies(character, values, clips)
+    others = dict.fromkeys(
+        name
+        for policy in (policies.own, *policies.others.values())
+        for name in _others(policy, character, given, gains)
+    )
+    if not others:
+        return ()
+    return (f"the policy was trained with other {', '.join(others)}: it may fall where it did not",)
+
+
+def _others(
+    policy: "Policy", character: Character, given: PlannerParameters, gains: GainArrays
+) -> list[str]:
+    """What a policy was trained with another value of, by name."""
     about = policy.about
     same = {
         "stiffness": np.allclose(policy.stiffness, gains.stiffness),
@@ -90,55 +110,20 @@ def describe_planner(character: Character, values: Values, gains: GainArrays) ->
         "gravity": np.isclose(about["gravity"], given.gravity),
         "mass": np.isclose(about["mass"], character.mass, rtol=1e-3),
     }
-    others = [name for name, is_same in same.items() if not is_same]
-    if not others:
-        return ()
-    return (f"the policy was trained with other {', '.join(others)}: it may fall where it did not",)
+    return [name for name, is_same in same.items() if not is_same]
 
 
-def policy_path(values: Values) -> Path:
-    """The file of the policy that the parameters' values say.
+def _choose_policies(character: Character, values: Values, clips: Sequence[str]) -> "Policies":
+    from controller_node.planner.policy.choosing import choose_policies  # compiled code
 
-    Raises:
-        ConfigurationError: there is none.
-    """
-    from controller_node.planner.policy.file import find_policy
-
-    return find_policy(_policy_name(values))
+    return choose_policies(character, values, clips)
 
 
-def _policy_name(values: Values) -> str:
-    """Without one it is the shipped one of the clip that is tracked, or of what is steered."""
-    from controller_node.planner.policy.file import shipped_policies
+def policies_read(character: Character, values: Values, clips: Sequence[str]) -> dict[str, Path]:
+    """The files of policies in use, see `choosing.policies_read`."""
+    from controller_node.planner.policy.choosing import policies_read
 
-    motion = _motion_name(values)
-    return PlannerParameters.of(values).policy or (motion if motion in shipped_policies() else "")
-
-
-def _motion_name(values: Values) -> str:
-    reference = MotionSettings.of(values).reference
-    return ClipSettings.of(values).clip if reference == "clip" else reference
-
-
-def _read_policy(character: Character, values: Values) -> "Policy":
-    """The policy that the parameters' values say, at this controller's rate."""
-    from controller_node.planner.policy.file import STEERED, read_policy
-
-    given, reference = PlannerParameters.of(values), MotionSettings.of(values).reference
-    motion, name = _motion_name(values), _policy_name(values)
-    policy = read_policy(name, character)
-    if policy.rate_hz != given.rate_hz:
-        raise ConfigurationError(
-            f"parameter 'rate' is {given.rate_hz}; the policy '{name}' is for {policy.rate_hz}"
-        )
-    trained = policy.about["clips"]
-    is_known = Path(motion).stem in [Path(each).stem for each in trained]
-    if reference not in ("clip", STEERED) or not is_known:
-        tracked = f"the clip is {motion}" if reference == "clip" else f"'reference' is {reference}"
-        raise ConfigurationError(
-            f"the policy '{name}' was trained on {', '.join(trained)}; {tracked}"
-        )
-    return policy
+    return policies_read(character, values, clips)
 
 
 def make_commands_in_flight(

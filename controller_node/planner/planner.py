@@ -152,8 +152,9 @@ class PredictivePlanner:
         if self.in_flight is not None:
             self.in_flight.restore(snapshot.sent)
 
-    def change_reference(self, since: int = 0) -> None:
+    def change_reference(self, since: int = 0, clip: str = "") -> None:
         """Say that the reference is another one from a tick on; the plan in force stays."""
+        del clip
         self._reference.clear(since)
         if self._coming is not None and since <= self._coming.tick + self.settings.horizon:
             self._abandon_search()

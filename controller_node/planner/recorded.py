@@ -38,7 +38,7 @@ class RecordedPlanner:
         if self.in_flight is not None:
             self.in_flight.clear()
 
-    def change_reference(self, since: int = 0) -> None:
+    def change_reference(self, since: int = 0, clip: str = "") -> None:
         """The offsets are added to whatever is tracked."""
 
     def rest(self) -> None:

@@ -57,6 +57,8 @@ class MachineKit:
 class PoseTarget:
     """The targets of the present tick, which hold until its end."""
 
+    clip = ""
+
     def __init__(self, layout: JointLayout) -> None:
         self._layout = layout
         self._still = np.zeros(layout.size)

@@ -13,7 +13,7 @@ from controller_node.control_laws import GainArrays
 from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.outlook import Outlook
 from controller_node.planner.planner import PredictivePlanner
-from controller_node.planner.policy.file import Policy
+from controller_node.planner.policy.choosing import Policies
 from controller_node.planner.policy.planner import PolicyPlanner
 from controller_node.planner.settings import PlannerSettings
 from msgs_config.arrays import FloatArray
@@ -30,12 +30,11 @@ _CALM_S = 0.4  # s for which it must have been so
 class HybridPlanner:
     """Goes over from a policy to plans, and back. It remembers which of them leads."""
 
-    def __init__(self, character: Character, policy: Policy, settings: PlannerSettings) -> None:
+    def __init__(self, character: Character, policies: Policies, settings: PlannerSettings) -> None:
         """Build both models of the dynamics."""
-        self._hold, self._rate_hz = policy.hold, settings.parameters.rate_hz
-        self._calm = policy.calm
+        self._rate_hz = settings.parameters.rate_hz
         self._predictive = PredictivePlanner(character, settings)
-        self._policy = PolicyPlanner(character, policy, settings.parameters)
+        self._policy = PolicyPlanner(character, policies, settings.parameters)
         self.rest()
 
     @property
@@ -63,10 +62,10 @@ class HybridPlanner:
         self._predictive.begin_episode(episode)
         self._policy.begin_episode(episode)
 
-    def change_reference(self, since: int = 0) -> None:
-        """Say that the reference is another one from a tick on."""
-        self._predictive.change_reference(since)
-        self._policy.change_reference(since)
+    def change_reference(self, since: int = 0, clip: str = "") -> None:
+        """Say that the reference is another one from a tick on; it may be a behaviour's clip."""
+        self._predictive.change_reference(since, clip)
+        self._policy.change_reference(since, clip)
 
     def rest(self) -> None:
         """Forget what leads, and where the reference had given way to: nothing is tracked."""
@@ -87,7 +86,8 @@ class HybridPlanner:
         given, tick = (acting, seen, gains, desired_at), seen.tick
         if tick < self._looked:
             self.rest()  # a state of before, which comes once more
-        is_due = self._looked < 0 or tick // self._hold > self._looked // self._hold
+        hold = self._policy.policy.hold
+        is_due = self._looked < 0 or tick // hold > self._looked // hold
         if is_due:
             self._looked = tick
         if self.plans:
@@ -104,12 +104,15 @@ class HybridPlanner:
         return self._predictive.offset(*given)
 
     def _is_pushed(self, tick: int) -> bool:
-        """Whether the policy expects too little of its last decision's state."""
-        return self._policy.expected < _TOO_LITTLE * self._calm or self._is_perturbed(tick)
+        """Whether there is no policy, or it expects too little of its last decision's state."""
+        least = _TOO_LITTLE * self._policy.policy.calm
+        is_calm = self._policy.is_trained and self._policy.expected >= least
+        return not is_calm or self._is_perturbed(tick)
 
     def _is_calm(self, tick: int, expected: float) -> bool:
         """Whether enough has been expected of states for a while, after another one."""
-        if expected < _ENOUGH * self._calm or self._is_perturbed(tick):
+        is_enough = self._policy.is_trained and expected >= _ENOUGH * self._policy.policy.calm
+        if not is_enough or self._is_perturbed(tick):
             self._calm_since = None
             return False
         if self._calm_since is None:

@@ -26,6 +26,7 @@ from controller_node.planner.compiled.observation import (
 from controller_node.planner.compiled.rollout import RolloutModel, features_against
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.outlook import Outlook
+from controller_node.planner.policy.choosing import Policies
 from controller_node.planner.policy.file import Policy
 from controller_node.planner.sampled_reference import ReferenceSample
 from controller_node.planner.settings import PlannerParameters
@@ -52,17 +53,18 @@ class PolicyPlanner:
     def __init__(
         self,
         character: Character,
-        policy: Policy,
+        policies: Policies,
         given: PlannerParameters,
         in_flight: "CommandsInFlight | None" = None,
     ) -> None:
         """Build the model of the dynamics."""
-        self._made_of = (character, policy, given)
+        self._made_of = (character, policies, given)
         self.in_flight = in_flight
-        self._policy, self._given = policy, given
+        self._policies, self._given = policies, given
+        self._clip = ""  # that a behaviour has the reference go over to
         self._model = ContactModel.of(character, given)
         self._engine = self._model.engine()
-        self._centre = policy.scales.centre
+        self._centre = policies.own.scales.centre
         self._gains: GainArrays | None = None
         self._told: dict[int, Told] = {}
         self._later = round(SOON * given.rate_hz)
@@ -72,13 +74,23 @@ class PolicyPlanner:
         """For a copy, in this process or another: it goes on alike."""
         sent = None if self.in_flight is None else self.in_flight.sent()
         looked = (self.anchor, self.outlook, self.expected)
-        state = (self._offset, self._decided, looked, sent)
+        state = (self._offset, self._decided, self._clip, looked, sent)
         return _copy_of, (self._made_of, state)
 
     @property
     def parts(self) -> tuple[object, ...]:
         """What is large in it and does not change."""
-        return (self._policy,)
+        return self._policies.own, *self._policies.others.values()
+
+    @property
+    def is_trained(self) -> bool:
+        """Whether there is a policy of what is tracked, which may be a behaviour's clip."""
+        return not self._clip or self._clip in self._policies.others
+
+    @property
+    def policy(self) -> Policy:
+        """That of what is tracked; the own motion's where there is none."""
+        return self._policies.others.get(self._clip, self._policies.own)
 
     def while_waiting(self, act: Callable[[], None]) -> None:
         """It does not wait."""
@@ -86,13 +98,15 @@ class PolicyPlanner:
     def begin_episode(self, episode: int) -> None:
         """Forget all."""
         del episode
+        self._clip = ""
         self._told.clear()
         self.rest()
         if self.in_flight is not None:
             self.in_flight.clear()
 
-    def change_reference(self, since: int = 0) -> None:
+    def change_reference(self, since: int = 0, clip: str = "") -> None:
         """Forget the reference from a tick on; the decision in force stays."""
+        self._clip = clip
         for tick in [tick for tick in self._told if tick >= since]:
             del self._told[tick]
 
@@ -116,7 +130,7 @@ class PolicyPlanner:
         ankle, and a policy that is told of it falls.
         """
         del acting
-        tick, state, hold = seen.tick, seen.state, self._policy.hold
+        tick, state, hold = seen.tick, seen.state, self.policy.hold
         if self._offset is not None and tick < self._decided:
             self.rest()  # a state of before, which comes once more
         if self._offset is None or tick // hold > self._decided // hold:
@@ -147,7 +161,7 @@ class PolicyPlanner:
         frames = self._frames(tick, desired_at, body)
         observation = self._observation(self._look(state, frames[0], body), frames)
         value = np.empty(1, np.float32)
-        evaluate(self._policy.value, observation, value)
+        evaluate(self.policy.value, observation, value)
         return float(value[0])
 
     def _body_of(self, gains: GainArrays) -> RolloutModel:
@@ -158,7 +172,7 @@ class PolicyPlanner:
     def _decide(
         self, tick: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
     ) -> FloatArray:
-        policy, body = self._policy, self._body_of(gains)
+        policy, body = self.policy, self._body_of(gains)
         frames = self._frames(tick, desired_at, body)
         now, look = frames[0], self._look(state, frames[0], body)
         soon = self._tell(tick + self._later, desired_at, body)
@@ -176,14 +190,14 @@ class PolicyPlanner:
         """The reference now and ahead; what is before is forgotten."""
         for known in [known for known in self._told if known < tick]:
             del self._told[known]
-        return [self._tell(tick + ahead, desired_at, body) for ahead in self._policy.ahead.tolist()]
+        return [self._tell(tick + ahead, desired_at, body) for ahead in self.policy.ahead.tolist()]
 
     def _observation(self, look: ReferenceSample, frames: list[Told]) -> SingleArray:
         now, deviation = frames[0], np.empty(len(look.features))
         find_deviation(deviation, look.features, now.features, now.facing, self._centre)
         told = np.array([each.frame for each in frames])
         observation = np.empty(len(deviation) + told.size, np.float32)
-        observe(observation, deviation, told, now.facing, self._policy.scales)
+        observe(observation, deviation, told, now.facing, self.policy.scales)
         return observation
 
     def _look(self, state: StampedState, now: Told, body: RolloutModel) -> ReferenceSample:
@@ -213,7 +227,7 @@ class PolicyPlanner:
             state = desired_at(tick)
             position = self._model.position_of(state.configuration.position)
             features = self._features(position, state.velocity, position, body)
-            frame = np.empty(self._policy.scales.frame_mean.shape[1])
+            frame = np.empty(self.policy.scales.frame_mean.shape[1])
             joints = state.configuration.position[6:].copy()
             write_frame(frame, position, joints, features, self._centre)
             facing = heading(position, self._model.left)
@@ -227,13 +241,13 @@ class PolicyPlanner:
         return Outlook(np.zeros(1), centre, cost, cost, self.anchor)
 
 
-def _copy_of(made_of: tuple[Character, Policy, PlannerParameters], state: Any) -> object:
+def _copy_of(made_of: tuple[Character, Policies, PlannerParameters], state: Any) -> object:
     """The copy of a planner that was made of these, in its state."""
     from controller_node.planner.factory import make_commands_in_flight
 
     character, _, given = made_of
     copy = PolicyPlanner(*made_of, make_commands_in_flight(character, given))
-    copy._offset, copy._decided, looked, sent = state
+    copy._offset, copy._decided, copy._clip, looked, sent = state
     copy.anchor, copy.outlook, copy.expected = looked
     if copy.in_flight is not None:
         copy.in_flight.restore(sent)

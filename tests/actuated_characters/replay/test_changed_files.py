@@ -17,6 +17,7 @@ from tests.support.physics import character
 
 KEYS = "keyframes:\n- {time: 0.0, pose: {hinge: 0.0}}\n- {time: 0.5, pose: {hinge: %s}}\n"
 GAIT = {"clip walk": "humanoid3d_walk.txt", "clip run": "humanoid3d_run.txt"}
+WALK_BY_POLICY = {"reference": "clip", "clip": "walk", "planner": "policy"}
 GET_UPS = {
     "clip getup_faceup": "humanoid3d_getup_faceup.txt",
     "clip getup_facedown": "humanoid3d_getup_facedown.txt",
@@ -88,8 +89,18 @@ def test_a_bag_that_names_no_files_says_nothing(run: Path, keys: Path) -> None:
             {"clip walk": "humanoid3d_walk.txt", "policy": "walk.npz"},
         ),
         (
-            {"reference": "clip", "clip": "walk", "planner": "policy", "policy": "walk"},
+            {**WALK_BY_POLICY, "policy": "walk"},
             {"clip walk": "humanoid3d_walk.txt", "policy": "walk.npz"},
+        ),
+        (
+            {**WALK_BY_POLICY, "behaviour": "active_ragdoll"},
+            {
+                "clip walk": "humanoid3d_walk.txt",
+                **GET_UPS,
+                "policy": "walk.npz",
+                "policy getup_faceup": "getup_faceup.npz",
+                "policy getup_facedown": "getup_facedown.npz",
+            },
         ),
         ({"reference": "steered", "steering.clips": ["run"]}, {"clip run": "humanoid3d_run.txt"}),
         ({"behaviour": "active_ragdoll"}, GET_UPS),

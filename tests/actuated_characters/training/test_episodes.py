@@ -17,6 +17,7 @@ from controller_node.planner.base import TickState
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.compiled.rollout import Desired
 from controller_node.planner.policy import planner as product
+from controller_node.planner.policy.choosing import Policies
 from controller_node.planner.policy.file import Policy
 from controller_node.planner.policy.planner import PolicyPlanner
 from controller_node.planner.search.cost import ResidualModel
@@ -199,7 +200,7 @@ def test_training_and_product_see_the_same_and_give_way_alike(
     about = {"hold": rules.hold, "rate": RATE, "largest": rules.largest}
     gains = JOB.gains.stiffness, JOB.gains.damping
     policy = Policy(about, network, value, stage.scales, stage.table.ahead, rules.unit, *gains)
-    player = PolicyPlanner(HUMANOID, policy, JOB.settings.parameters)
+    player = PolicyPlanner(HUMANOID, Policies(policy), JOB.settings.parameters)
     monkeypatch.setattr(product, "decide", note)  # it has decided once, to be compiled
     (reference,) = JOB.references
     told, moved = [], 0.0

@@ -108,6 +108,18 @@ def test_it_plans_from_a_hard_push_until_it_has_been_calm_for_a_while(
     assert 4 * over < 96 + 2 * 240
 
 
+def test_it_plans_for_a_clip_without_a_policy(planner: HybridPlanner) -> None:
+    led = []
+    for tick in range(0, 320, 4):
+        if tick in (16, 64):
+            planner.change_reference(tick, "unheard-of" if tick == 16 else "")
+        answer(planner, tick)
+        led.append(planner.plans)
+
+    assert not any(led[:4]) and all(led[4:16]), "from the change on"
+    assert not all(led[16:]), "it has been calm for a while"
+
+
 def test_who_takes_over_sees_the_reference_where_it_had_given_way_to(
     planner: HybridPlanner,
 ) -> None:

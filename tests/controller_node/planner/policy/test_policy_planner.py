@@ -277,6 +277,28 @@ def test_its_memory_goes_without_its_weights(make: Callable[..., Controller]) ->
     assert efforts(found, sent, range(20, 40)) == efforts(original, sent, range(20, 40))
 
 
+@DUPLICATES
+def test_a_behaviours_clip_is_decided_by_its_own_policy(
+    duplicate: Callable[[Controller], Controller],
+) -> None:
+    values = resolve_for(HUMANOID, {"planner": "policy", "behaviour": "active_ragdoll", **WALK})
+    walk = make_controller(HUMANOID, make_motion(HUMANOID, values).reference, values)
+    planner_of(walk).change_reference(0, "getup_faceup")
+    rise = {"planner": "policy", "reference": "clip", "clip": "getup_faceup"}
+    alone = resolve_for(HUMANOID, rise)
+    own = make_controller(HUMANOID, make_motion(HUMANOID, alone).reference, alone)
+    sent = states(9)
+
+    expected = offsets(own, sent, range(9))
+
+    assert offsets(duplicate(walk), sent, range(9)) == expected
+    planner_of(walk).change_reference()
+    assert offsets(walk, sent, range(9)) != expected
+    planner_of(walk).change_reference(0, "getup_faceup")
+    planner_of(walk).begin_episode(0)
+    assert offsets(walk, sent, range(9)) != expected
+
+
 # The reference gives way
 
 
@@ -366,22 +388,47 @@ def test_a_run_has_the_same_bits_again_and_in_a_replay(
     assert main(["report", str(tmp_path / "one")]) == 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("through", [[], ["--through-topics", "controller"]])
+def test_who_falls_gets_up_by_the_policy_of_that_clip(through: list[str], tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    command = ["run", "--in-process", "--clip", "walk", "--duration", "5", "--planner", "policy"]
+    command += ["--behaviour", "active_ragdoll", "--push", "chest:1700,0,0@0.2"]
+
+    assert main([*command, "--output", str(run)]) == 0
+
+    recording = read_recording(run)
+    modes = [change.mode for change in recording.modes]
+    assert modes[:4] == ["TRACK", "LIMP", "SEARCH", "BLEND"]
+    assert recording.modes[3].facts["clip"] in ("getup_faceup", "getup_facedown")
+    assert not recording.effort[:, :6].any()
+    assert main(["replay", str(run), *through]) == 0
+
+
 # What it refuses
 
 
 REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
     "a fixed base": ("pendulum", {}, "planner 'policy' is for a floating base with joints"),
-    "a limp one": ("humanoid", {"behaviour": "ragdoll"}, "'policy' is for the behaviour tracking"),
-    "reactions": ("humanoid", {"behaviour": "reactive"}, "'policy' is for the behaviour tracking"),
+    "a limp one": (
+        "humanoid",
+        {"behaviour": "ragdoll"},
+        "'policy' is for a behaviour that follows a motion",
+    ),
+    "clips without policies": (
+        "humanoid",
+        {"behaviour": "reactive", "library": ["roll"]},
+        "there is no policy of roll",
+    ),
     "a pursuit": (
         "humanoid",
         {"behaviour": "pursuit", "opponent": "b"},
-        "'policy' is for the behaviour tracking",
+        "whose way no planner can foresee",
     ),
     "a machine": (
         "humanoid",
         {"behaviour": "state_machine", "reference": "steered"},
-        "'policy' is for the behaviour tracking",
+        "'policy' is for a behaviour that follows clips",
     ),
     "another law": ("humanoid", {"law": "pd"}, "'law' is pd"),
     "virtual forces": ("humanoid", {"balance.enabled": True}, "'balance.enabled' must be false"),
