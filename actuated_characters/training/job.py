@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.training.entries import Entries
 from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.references import TrainedReference, frames_ahead
 from actuated_characters.training.worlds import action_unit, hold_ticks
@@ -38,6 +39,7 @@ class Job:
     most_push: float  # N s
     seed: int
     threads: int
+    after: tuple[str, ...] = ()  # what else its motions begin after
 
 
 def make_job(
@@ -48,8 +50,11 @@ def make_job(
     most_push: float = 0.0,
     seed: int = 0,
     threads: int = 1,
+    after: Sequence[str] = (),
 ) -> Job:
     """The job of some exercises of one character; `controller` has the controller's parameters.
+
+    `after` are clips, and `FALL`, after which each of them begins, too: see `Entries`.
 
     Raises:
         ActuatedCharactersError: a name or a value is wrong, a planner cannot work with it, or what
@@ -66,6 +71,9 @@ def make_job(
         TrainedReference(_tracked(plan, settings), each.cycle_s, each.wraps)
         for plan, each in zip(plans, exercises, strict=True)
     ]
+    for exercise, plan in zip(exercises, plans, strict=True):
+        entries = Entries(exercise, plan, seed)
+        references += [entry for name in after for entry in entries.after(name)]
     return Job(
         character,
         references,
@@ -76,6 +84,7 @@ def make_job(
         most_push,
         seed,
         threads,
+        tuple(after),
     )
 
 

@@ -34,6 +34,8 @@ class TrainedReference:
     reference: TrackedReference  # as a controller would track it
     cycle_s: float  # until which they may begin
     wraps: bool  # whether it goes on from its end
+    lasts_s: float = 0.0  # until which it goes on, if that is longer
+    weight: float = 1.0  # how many episodes begin in it, against others
 
 
 def frames_ahead(rate_hz: int) -> IntArray:
@@ -48,12 +50,13 @@ def make_table(
     ahead = frames_ahead(rate_hz)
     parts, starts, first = list[tuple[FloatArray, ...]](), list[StartRange](), 0
     for each in references:
-        seconds = each.cycle_s + _AFTER_S
+        seconds = max(each.cycle_s, each.lasts_s) + _AFTER_S
         if each.wraps:
             seconds = max(seconds, _WRAPPED_S)
         count = round(seconds * rate_hz) + int(ahead[-1]) + 2
         parts.append(_sample(model, body, each.reference, count))
-        starts.append(StartRange(first, max(round(each.cycle_s * rate_hz), 1), each.wraps))
+        begins = max(round(each.cycle_s * rate_hz), 1)
+        starts.append(StartRange(first, begins, each.wraps, each.weight))
         first += count
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     lasts = np.cumsum([len(part[0]) for part in parts]) - 1

@@ -26,6 +26,7 @@ class StartRange:
     first: int
     count: int
     wraps: bool  # whether the rows after them are the same motion again
+    weight: float = 1.0  # how many begin in it, against others
 
     @property
     def rows(self) -> IntArray:
@@ -34,7 +35,7 @@ class StartRange:
 
 
 class Starts:
-    """Draws rows: every reference is as likely, and in it half of the starts by failure rates."""
+    """Draws rows: references by their weights, and in one half of the starts by failure rates."""
 
     def __init__(self, ranges: Sequence[StartRange], rate_hz: int) -> None:
         """Divide each range into bins."""
@@ -81,9 +82,12 @@ class Starts:
         self._weights = (1.0 - _HARD) * self._even + _HARD * hard
 
     def _shared(self, weights: FloatArray) -> FloatArray:
-        """Weights of bins, so that those of each range have the same sum, together one."""
-        parts = [weights[part] / weights[part].sum() for part in self._parts]
-        shared: FloatArray = np.concatenate(parts) / len(parts)
+        """Weights of bins, so that those of each range have its weight in sum, together one."""
+        parts = [
+            each.weight * weights[part] / weights[part].sum()
+            for part, each in zip(self._parts, self._ranges, strict=True)
+        ]
+        shared: FloatArray = np.concatenate(parts) / sum(each.weight for each in self._ranges)
         return shared
 
     def _bins(self, rows: IntArray) -> IntArray:

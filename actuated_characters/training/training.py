@@ -195,6 +195,7 @@ class Training:
             "decisions": self._done,
             "seed": job.seed,
             "pushes_ns": round(min(self._push, job.most_push), 1),
+            **({"after": list(job.after)} if job.after else {}),
             **({} if self._from is None else {"from": self._from}),
         }
         policy, value = (

@@ -16,7 +16,8 @@ from msgs_config.character.model import Character
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import SharedSettings
 
-_LYING_PART = 0.5  # the part of a get-up clip in which it may begin
+LYING_PART = 0.5
+"""The part of a get-up clip in which it may begin."""
 
 
 @BEHAVIOURS.register("active_ragdoll", ReactionSettings)
@@ -50,7 +51,7 @@ def _make_kit(character: Character, values: Values, *, searches: bool = False) -
         library = MotionLibrary(character, settings.library, settings.blend_duration)
     if settings.by_clip:
         sides = [settings.face_up, settings.face_down]
-        get_ups = MotionLibrary(character, sides, lasting=0.0, share=_LYING_PART)
+        get_ups = MotionLibrary(character, sides, lasting=0.0, share=LYING_PART)
     kit = ReactionKit(
         character=character,
         settings=settings,

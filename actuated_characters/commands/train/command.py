@@ -54,6 +54,14 @@ def _add_what(command: argparse.ArgumentParser) -> None:
         "clips, where --clip names some",
     )
     command.add_argument(
+        "--after",
+        action="append",
+        default=[],
+        metavar="CLIP",
+        help="learn to go over to the motion from where another clip ends, too, or, after `fall`, "
+        "from how a limp body lies, as active_ragdoll and reactive do; may be repeated",
+    )
+    command.add_argument(
         "--minutes",
         type=float,
         default=10.0,

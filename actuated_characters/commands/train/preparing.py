@@ -85,6 +85,7 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
         most_push=options.pushes,
         seed=options.seed,
         threads=threads,
+        after=options.after,
     )
 
 

@@ -142,6 +142,8 @@ def _options(arguments: Sequence[str]) -> object:
         (["--seed", "-1"], "--seed is -1; it must be 0 or more"),
         (["--threads", "0"], "--threads is 0; it must be 1 or more"),
         (["--clip", "wlak"], "wlak"),
+        (["--after", "wlak"], "wlak"),
+        (["--after", "fall"], "walk begins standing"),
         (["--clip", "folder.npz"], "there is no .json or .txt file of motion in it"),
         (["--clip", "steered.json"], "--clip steered.json: a policy keeps that name for --steer"),
         (["--character", "humanoit"], "humanoit"),
