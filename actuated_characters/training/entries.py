@@ -87,8 +87,8 @@ class Entries:
             there = self._plan.reference.sample(match.time).configuration.position
             carry = PlanarTransform.leading(there, 0.0, position, match.turn)
             body = ReferenceState(lies, still, still)
-            rest = self._exercise.cycle_s - match.time
-            yield self._entry(carry, match.time, body, self._settings.recovery_duration, rest)
+            left = self._exercise.cycle_s - match.time
+            yield self._entry(carry, match.time, body, self._settings.recovery_duration, left)
 
     def _lying(self) -> Iterator[FloatArray]:
         """Positions (n,) of bodies that went limp somewhere in the motion, and fell."""
@@ -113,7 +113,7 @@ class Entries:
         moment: float,
         begin: ReferenceState,
         blend_s: float,
-        rest_s: float,
+        lasts_s: float,
     ) -> TrainedReference:
         """From a state over to a moment of the motion, carried, as a behaviour's target goes."""
         plan, layout = self._plan, self._layout
@@ -122,4 +122,4 @@ class Entries:
         clock = TickClock(plan.simulation.rate_hz)
         tracked = TrackedReference(plan.character, plan.reference, clock, episode_ns=0)
         tracked.target = ClipTarget(self._exercise.name, motion, offset)
-        return TrainedReference(tracked, blend_s, wraps=False, lasts_s=rest_s)
+        return TrainedReference(tracked, blend_s, wraps=False, lasts_s=lasts_s)
