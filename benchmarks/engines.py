@@ -1,4 +1,4 @@
-"""README's loop on each engine, a batch, and plain loops in MuJoCo: processor time of a tick."""
+"""A loop of law and world on each engine, a batch, and plain loops in MuJoCo: processor time of a tick."""
 
 import time
 from collections.abc import Callable

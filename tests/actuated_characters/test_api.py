@@ -79,7 +79,9 @@ def test_the_lines_of_the_readme_have_the_hash_of_the_run_that_they_name() -> No
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout
     walk: dict[str, object] = {"reference": "clip", "clip": "walk"}
-    assert printed.split()[0] == hash_of_run("humanoid", 2.0, reference=walk)
+    assert printed.split()[0] == hash_of_run(
+        "humanoid", 2.0, reference=walk, controller={"planner": "policy"}
+    )
 
 
 def test_the_lines_of_the_page_work() -> None:
