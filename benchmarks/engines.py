@@ -1,4 +1,4 @@
-"""A loop of law and world on each engine, a batch, and plain loops in MuJoCo: processor time of a tick."""
+"""Law and world on each engine, a batch, and plain loops in MuJoCo: processor time of a tick."""
 
 import time
 from collections.abc import Callable

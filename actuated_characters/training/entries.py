@@ -42,8 +42,12 @@ _KICK, _SPIN = 1.5, 2.0  # m/s and rad/s, with which it falls, standard deviatio
 class Entries:
     """The entries of an exercise, of which a plan has motion and parameters."""
 
-    def __init__(self, exercise: Exercise, plan: RunPlan, seed: int) -> None:
+    def __init__(
+        self, exercise: Exercise, plan: RunPlan, seed: int, *, follows_velocity: bool = True
+    ) -> None:
+        """`follows_velocity` says whether the reference's velocity is tracked, rather than zero."""
         self._exercise, self._plan = exercise, plan
+        self._follows_velocity = follows_velocity
         self._layout = plan.character.layout
         self._settings = ReactionSettings.of(plan.controller)
         self._posture = Posture(plan.character)
@@ -53,9 +57,14 @@ class Entries:
         """Entries after a clip, or after falls; together they weigh as much as the motion.
 
         Raises:
-            ActuatedCharactersError: there is no such clip, or the motion does not begin lying.
+            ActuatedCharactersError: there is no such clip; or the motion does not begin lying, or
+                on a side on which no fall ends.
         """
         found = list(self._after_falls() if name == FALL else self._after_clip(name))
+        if not found:
+            raise ConfigurationError(
+                f"--after {FALL}: no fall ends on the side on which {self._exercise.name} begins"
+            )
         return [replace(each, weight=1.0 / len(found)) for each in found]
 
     def _after_clip(self, name: str) -> Iterator[TrainedReference]:
@@ -71,13 +80,13 @@ class Entries:
     def _after_falls(self) -> Iterator[TrainedReference]:
         """At the moment that is nearest to how a body lies, if on the side on which it begins."""
         name, layout = self._exercise.name, self._layout
-        library = MotionLibrary(self._plan.character, [name], lasting=0.0, share=LYING_PART)
         first, still = self._plan.reference.sample(0.0).configuration, np.zeros(layout.size)
         rest = layout.configuration(np.array(self._plan.character.rest_position))
         if not self._posture.has_fallen(first, rest):
             raise ConfigurationError(
                 f"--after {FALL} is for clips that begin lying; {name} begins standing"
             )
+        library = MotionLibrary(self._plan.character, [name], lasting=0.0, share=LYING_PART)
         side = self._posture.faces_up(first.orientations_xyzw[0])
         for position in self._lying():
             lies = layout.configuration(position)
@@ -121,5 +130,6 @@ class Entries:
         offset = InertializationOffset(layout, motion.sample(0.0), begin, 0.0, blend_s)
         clock = TickClock(plan.simulation.rate_hz)
         tracked = TrackedReference(plan.character, plan.reference, clock, episode_ns=0)
+        tracked.follows_velocity = self._follows_velocity
         tracked.target = ClipTarget(self._exercise.name, motion, offset)
         return TrainedReference(tracked, blend_s, wraps=False, lasts_s=lasts_s)

@@ -32,7 +32,7 @@ class Job:
 
     character: Character
     references: Sequence[TrainedReference]
-    names: tuple[str, ...]  # of the references
+    names: tuple[str, ...]  # of the exercises
     settings: PlannerSettings
     gains: GainArrays
     decisions: int
@@ -72,7 +72,7 @@ def make_job(
         for plan, each in zip(plans, exercises, strict=True)
     ]
     for exercise, plan in zip(exercises, plans, strict=True):
-        entries = Entries(exercise, plan, seed)
+        entries = Entries(exercise, plan, seed, follows_velocity=settings.follows_velocity)
         references += [entry for name in after for entry in entries.after(name)]
     return Job(
         character,
@@ -119,6 +119,12 @@ def check_resumed(job: Job, start: Policy) -> None:
         raise ConfigurationError(
             f"the policy's clips: {clips}, this training's: {names}; --resume goes on with the "
             "same, --from begins with what a policy of other clips can"
+        )
+    after, wanted = ", ".join(start.about["trained"].get("after", [])), ", ".join(job.after)
+    if after != wanted:
+        raise ConfigurationError(
+            f"the policy was trained --after: {after or 'nothing'}, this training's: "
+            f"{wanted or 'nothing'}; --resume goes on with the same"
         )
     if decisions_of(start) >= job.decisions:
         raise ConfigurationError(

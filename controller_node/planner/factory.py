@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from controller_node.planner.policy.file import Policy
 
 
-def check_planning(character: Character, values: Values, clips: Sequence[str] = ()) -> None:
+def check_planning(character: Character, values: Values, clips: Sequence[str]) -> None:
     """Raise ActuatedCharactersError as `make_planner`."""
     name = PlannerParameters.of(values).planner
     if name == NO_PLANNER:
@@ -48,7 +48,7 @@ def check_planning(character: Character, values: Values, clips: Sequence[str] = 
         make_planner_settings(character, values)
 
 
-def make_planner(character: Character, values: Values, clips: Sequence[str] = ()) -> Planner | None:
+def make_planner(character: Character, values: Values, clips: Sequence[str]) -> Planner | None:
     """The planner that the parameters' values say; None without one.
 
     `clips` are those that a behaviour may go over to.
@@ -89,17 +89,17 @@ def describe_planner(
     if given.planner not in (POLICY, HYBRID):
         return ()
     policies = _choose_policies(character, values, clips)
-    others = dict.fromkeys(
-        name
-        for policy in (policies.own, *policies.others.values())
-        for name in _others(policy, character, given, gains)
-    )
-    if not others:
-        return ()
-    return (f"the policy was trained with other {', '.join(others)}: it may fall where it did not",)
+    warnings = list[str]()
+    for policy in (policies.own, *policies.others.values()):
+        if others := _differences(policy, character, given, gains):
+            warnings.append(
+                f"the policy of {', '.join(policy.about['clips'])} was trained with other "
+                f"{', '.join(others)}: it may fall where it did not"
+            )
+    return tuple(dict.fromkeys(warnings))
 
 
-def _others(
+def _differences(
     policy: "Policy", character: Character, given: PlannerParameters, gains: GainArrays
 ) -> list[str]:
     """What a policy was trained with another value of, by name."""

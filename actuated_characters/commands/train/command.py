@@ -59,7 +59,8 @@ def _add_what(command: argparse.ArgumentParser) -> None:
         default=[],
         metavar="CLIP",
         help="learn to go over to the motion from where another clip ends, too, or, after `fall`, "
-        "from how a limp body lies, as active_ragdoll and reactive do; may be repeated",
+        "from how a limp body lies, as active_ragdoll and reactive do when they get up; may be "
+        "repeated",
     )
     command.add_argument(
         "--minutes",

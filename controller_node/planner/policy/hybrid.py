@@ -9,6 +9,8 @@ takes over where it had given way to.
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from controller_node.control_laws import GainArrays
 from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.outlook import Outlook
@@ -33,6 +35,7 @@ class HybridPlanner:
     def __init__(self, character: Character, policies: Policies, settings: PlannerSettings) -> None:
         """Build both models of the dynamics."""
         self._rate_hz = settings.parameters.rate_hz
+        self._calm_since: int | None = None  # tick
         self._predictive = PredictivePlanner(character, settings)
         self._policy = PolicyPlanner(character, policies, settings.parameters)
         self.rest()
@@ -64,6 +67,8 @@ class HybridPlanner:
 
     def change_reference(self, since: int = 0, clip: str = "") -> None:
         """Say that the reference is another one from a tick on; it may be a behaviour's clip."""
+        if clip != self._policy.clip:
+            self._calm_since = None  # another policy's calm
         self._predictive.change_reference(since, clip)
         self._policy.change_reference(since, clip)
 
@@ -73,7 +78,7 @@ class HybridPlanner:
         self._policy.rest()
         self.plans = False
         """Whether it plans ahead, rather than have the policy answer."""
-        self._calm_since: int | None = None  # tick
+        self._calm_since = None
         self._looked = -1  # the last tick of a look
 
     def offset(
@@ -81,7 +86,8 @@ class HybridPlanner:
     ) -> FloatArray:
         """What is added to the tracking errors (n,) of a state; zero for the root.
 
-        The arguments are those of `PredictivePlanner.offset`.
+        It plans from the state in which the offset acts; looks, and the policy, are of the state
+        that is seen.
         """
         given, tick = (acting, seen, gains, desired_at), seen.tick
         if tick < self._looked:
@@ -92,10 +98,10 @@ class HybridPlanner:
             self._looked = tick
         if self.plans:
             self._policy.anchor = self._predictive.anchor
-            if is_due and self._is_calm(
-                tick, self._policy.expect(tick, seen.state, gains, desired_at)
-            ):
+            if is_due and self._is_calm(seen, gains, desired_at):
                 self._hand_to_policy()
+        elif not self._policy.is_trained:
+            self._hand_to_plans(np.zeros(len(seen.state.velocity)))
         if not self.plans:
             offset = self._policy.offset(*given)
             if not (is_due and self._is_pushed(tick)):
@@ -104,15 +110,19 @@ class HybridPlanner:
         return self._predictive.offset(*given)
 
     def _is_pushed(self, tick: int) -> bool:
-        """Whether there is no policy, or it expects too little of its last decision's state."""
+        """Whether the policy expects too little of its last decision's state."""
         least = _TOO_LITTLE * self._policy.policy.calm
-        is_calm = self._policy.is_trained and self._policy.expected >= least
-        return not is_calm or self._is_perturbed(tick)
+        return self._policy.expected < least or self._is_perturbed(tick)
 
-    def _is_calm(self, tick: int, expected: float) -> bool:
-        """Whether enough has been expected of states for a while, after another one."""
-        is_enough = self._policy.is_trained and expected >= _ENOUGH * self._policy.policy.calm
-        if not is_enough or self._is_perturbed(tick):
+    def _is_calm(self, seen: TickState, gains: GainArrays, desired_at: DesiredAt) -> bool:
+        """Whether a policy has expected enough of states for a while, after another one."""
+        tick, policy = seen.tick, self._policy
+        is_enough = (
+            policy.is_trained
+            and not self._is_perturbed(tick)
+            and policy.expect(tick, seen.state, gains, desired_at) >= _ENOUGH * policy.policy.calm
+        )
+        if not is_enough:
             self._calm_since = None
             return False
         if self._calm_since is None:

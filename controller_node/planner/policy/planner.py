@@ -61,7 +61,8 @@ class PolicyPlanner:
         self._made_of = (character, policies, given)
         self.in_flight = in_flight
         self._policies, self._given = policies, given
-        self._clip = ""  # that a behaviour has the reference go over to
+        self.clip = ""
+        """The one that a behaviour has the reference go over to; empty: the own motion."""
         self._model = ContactModel.of(character, given)
         self._engine = self._model.engine()
         self._centre = policies.own.scales.centre
@@ -74,7 +75,7 @@ class PolicyPlanner:
         """For a copy, in this process or another: it goes on alike."""
         sent = None if self.in_flight is None else self.in_flight.sent()
         looked = (self.anchor, self.outlook, self.expected)
-        state = (self._offset, self._decided, self._clip, looked, sent)
+        state = (self._offset, self._decided, self.clip, looked, sent)
         return _copy_of, (self._made_of, state)
 
     @property
@@ -85,12 +86,12 @@ class PolicyPlanner:
     @property
     def is_trained(self) -> bool:
         """Whether there is a policy of what is tracked, which may be a behaviour's clip."""
-        return not self._clip or self._clip in self._policies.others
+        return not self.clip or self.clip in self._policies.others
 
     @property
     def policy(self) -> Policy:
         """That of what is tracked; the own motion's where there is none."""
-        return self._policies.others.get(self._clip, self._policies.own)
+        return self._policies.others.get(self.clip, self._policies.own)
 
     def while_waiting(self, act: Callable[[], None]) -> None:
         """It does not wait."""
@@ -98,7 +99,7 @@ class PolicyPlanner:
     def begin_episode(self, episode: int) -> None:
         """Forget all."""
         del episode
-        self._clip = ""
+        self.clip = ""
         self._told.clear()
         self.rest()
         if self.in_flight is not None:
@@ -106,7 +107,7 @@ class PolicyPlanner:
 
     def change_reference(self, since: int = 0, clip: str = "") -> None:
         """Forget the reference from a tick on; the decision in force stays."""
-        self._clip = clip
+        self.clip = clip
         for tick in [tick for tick in self._told if tick >= since]:
             del self._told[tick]
 
@@ -245,10 +246,11 @@ def _copy_of(made_of: tuple[Character, Policies, PlannerParameters], state: Any)
     """The copy of a planner that was made of these, in its state."""
     from controller_node.planner.factory import make_commands_in_flight
 
-    character, _, given = made_of
-    copy = PolicyPlanner(*made_of, make_commands_in_flight(character, given))
-    copy._offset, copy._decided, copy._clip, looked, sent = state
+    (character, _, given), (*own, looked, sent) = made_of, state
+    in_flight = None if sent is None else make_commands_in_flight(character, given)
+    copy = PolicyPlanner(*made_of, in_flight)
+    copy._offset, copy._decided, copy.clip = own
     copy.anchor, copy.outlook, copy.expected = looked
-    if copy.in_flight is not None:
-        copy.in_flight.restore(sent)
+    if in_flight is not None:
+        in_flight.restore(sent)
     return copy

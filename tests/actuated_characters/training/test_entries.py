@@ -59,7 +59,7 @@ def test_after_a_clip_it_begins_as_that_ends_at_moments_of_all_of_the_motion() -
         then = entry.reference.desired_at(round(entry.cycle_s * RATE) + 1)
         offs = [
             np.abs(pose(walk.sample(tick / RATE)) - pose(then)).max()
-            for tick in range(round(float(1.27 * RATE)))
+            for tick in range(round(1.27 * RATE))
         ]
         assert min(offs) < 0.05  # rad: it is a moment of the walk
         phases.append(int(np.argmin(offs)))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -320,6 +321,10 @@ def test_every_start_is_a_row_of_its_own_reference() -> None:
         for rows in (stretch.rows for stretch in starts):
             assert set(table.ends[rows]) == {table.ends[rows[0]]}
             assert (rows < table.ends[rows] - table.ahead[-1]).all()
+        longer = replace(references[0], cycle_s=1.0, lasts_s=30.0, weight=0.25)
+        table, (start,) = make_table(model, body, [longer], 30)
+        assert len(table.ends) >= 31 * 30
+        assert (start.count, start.weight) == (30, 0.25)
     finally:
         stage.worlds.close()
 

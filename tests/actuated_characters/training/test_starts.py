@@ -1,5 +1,7 @@
 """Episodes begin anywhere, and more often around where others fell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,17 @@ def test_every_reference_is_as_likely_and_every_row_of_it() -> None:
         assert counts / len(own) == pytest.approx(0.1, abs=0.015)
         assert own.min() >= each.first
         assert own.max() < each.first + each.count
+
+
+@pytest.mark.parametrize("learns", [False, True])
+def test_more_episodes_begin_in_what_weighs_more(learns: bool) -> None:
+    starts = Starts([WALK, replace(KICK, weight=0.25)], RATE)
+    if learns:
+        starts.learn(np.arange(WALK.count), np.arange(WALK.count) > WALK.count // 2)
+
+    rows = starts.draw(DRAWS, np.random.default_rng(1))
+
+    assert (rows >= KICK.first).mean() == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_reference_shorter_than_a_bin_has_all_its_rows() -> None:

@@ -5,7 +5,7 @@ import pytest
 from actuated_characters.runs.plan import make_plan
 from controller_node.planner.policy.file import shipped_policies
 
-SAYS = "the policy was trained with other {}: it may fall where it did not"
+SAYS = "the policy of walk was trained with other {}: it may fall where it did not"
 
 
 def warnings(clip: str, planner: str = "policy", **controller: object) -> tuple[str, ...]:

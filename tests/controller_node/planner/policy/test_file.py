@@ -186,7 +186,7 @@ def error_of(path: Path | str, **given: object) -> str:
     errors = set()
     for use in (check_planning, make_planner):
         with pytest.raises(ActuatedCharactersError) as caught:
-            use(HUMANOID, values)
+            use(HUMANOID, values, [])
         assert type(caught.value) is ConfigurationError
         errors.add(str(caught.value))
     (error,) = errors

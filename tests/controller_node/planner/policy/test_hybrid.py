@@ -110,14 +110,14 @@ def test_it_plans_from_a_hard_push_until_it_has_been_calm_for_a_while(
 
 def test_it_plans_for_a_clip_without_a_policy(planner: HybridPlanner) -> None:
     led = []
-    for tick in range(0, 320, 4):
-        if tick in (16, 64):
-            planner.change_reference(tick, "unheard-of" if tick == 16 else "")
+    for tick in range(0, 320):
+        if tick in (19, 64):  # in the midst of a decision
+            planner.change_reference(tick, "unheard-of" if tick == 19 else "")
         answer(planner, tick)
         led.append(planner.plans)
 
-    assert not any(led[:4]) and all(led[4:16]), "from the change on"
-    assert not all(led[16:]), "it has been calm for a while"
+    assert not any(led[:19]) and all(led[19:64]), "from the change on"
+    assert not all(led[64:]), "it has been calm for a while"
 
 
 def test_who_takes_over_sees_the_reference_where_it_had_given_way_to(
@@ -150,6 +150,28 @@ def test_a_state_that_comes_again_is_answered_alike(planner: HybridPlanner) -> N
 
     for number, tick in enumerate(range(0, 48, 4)):
         assert {answer(planner, tick, slip=1.5) for _ in range(3)} == {once[number]}
+
+
+@DUPLICATES
+def test_a_copy_goes_on_where_commands_are_late(
+    duplicate: Callable[[HybridPlanner], HybridPlanner],
+) -> None:
+    values = resolve_for(HUMANOID, {**WALK, **GIVEN, "command_delay_ticks": 2})
+    controller = make_controller(HUMANOID, REFERENCE, values)
+    sent = [
+        StampedState(CLOCK.stamp_ns(1 + tick), state.configuration.position, state.velocity, None)
+        for tick, state in enumerate(REFERENCE.sample(tick / 240) for tick in range(12))
+    ]
+    first = sent[0].stamp_ns
+    for state in sent[:6]:
+        controller.compute_effort(state, first)
+
+    copied = duplicate(controller)  # type: ignore[arg-type,type-var]
+
+    for state in sent[6:]:
+        expected, _ = controller.compute_effort(state, first)
+        found, _ = copied.compute_effort(state, first)  # type: ignore[attr-defined]
+        assert found.tobytes() == expected.tobytes()
 
 
 @DUPLICATES

@@ -389,6 +389,24 @@ def test_a_run_has_the_same_bits_again_and_in_a_replay(
 
 
 @pytest.mark.slow
+def test_a_controller_takes_the_policy_of_what_its_behaviour_tracks() -> None:
+    behaviour = {"planner": "policy", "behaviour": "active_ragdoll"}
+    plan = make_plan("humanoid", 5.0, WALK, {}, behaviour)
+    controller = make_controller(HUMANOID, plan.reference, plan.controller)
+    pushes = [plan_push(plan, "chest", (1700.0, 0.0, 0.0), 0.2)]
+    led = set()
+    for _ in ticks_in_process(plan, pushes, controller=controller):
+        mode = controller.mode
+        assert mode is not None
+        (clip,) = planner_of(controller).policy.about["clips"]
+        led.add((mode.phase.mode.value, mode.phase.facts.get("clip"), clip))
+
+    rise = next(clip for mode, clip, _ in led if mode == "BLEND" and clip)
+    assert ("TRACK", None, "walk") in led
+    assert {clip for mode, tracked, clip in led if tracked == rise and mode == "BLEND"} == {rise}
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("through", [[], ["--through-topics", "controller"]])
 def test_who_falls_gets_up_by_the_policy_of_that_clip(through: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
