@@ -42,7 +42,7 @@ def moving(whole: Character, seed: int) -> Reference:
 def switch(layout: JointLayout, goal: Reference, wanted: ReferenceState) -> Sample:
     """The way to a motion from a state at the start."""
     offset = InertializationOffset(layout, goal.sample(START), wanted, START, DURATION)
-    target = ClipTarget(TransformedReference(layout, goal), offset)
+    target = ClipTarget("goal", TransformedReference(layout, goal), offset)
     return lambda time: target.state_at(time, goal.sample(time))
 
 
