@@ -7,7 +7,6 @@ from controller_node.behaviours.factory import BehaviourSettings, behaviour_clip
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
 from controller_node.controller_settings import LawSettings
-from controller_node.planner.factory import policies_read
 from controller_node.planner.settings import HYBRID, POLICY, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -25,14 +24,17 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
         ActuatedCharactersError: there is no such clip, machine, policy, or file of keyframes.
     """
     behaviour, files = BehaviourSettings.of(values).behaviour, dict[str, Path]()
-    for name in (*_reference_clips(character, values), *behaviour_clips(character, values)):
+    clips = behaviour_clips(character, values)
+    for name in (*_reference_clips(character, values), *clips):
         files[f"clip {name}"] = clip_path(character, name)
     if MotionSettings.of(values).reference == "keyframes":
         files["keyframes"] = keyframes_path(KeyframesSettings.of(values).keyframes)
     if behaviour == STATE_MACHINE:
         files["machine"] = machine_path(MachineSettings.of(values).machine)
     if PlannerParameters.of(values).planner in (POLICY, HYBRID):
-        files |= policies_read(character, values, behaviour_clips(character, values))
+        from controller_node.planner.policy.choosing import policies_read  # compiled code
+
+        files |= policies_read(character, values, clips)
     if feedforward := LawSettings.of(values).feedforward:
         files["feedforward"] = Path(feedforward)
     return files

@@ -24,7 +24,6 @@ from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.settings import PlannerParameters
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
-from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray
@@ -125,11 +124,10 @@ class Entries:
         lasts_s: float,
     ) -> TrainedReference:
         """From a state over to a moment of the motion, carried, as a behaviour's target goes."""
-        plan, layout = self._plan, self._layout
-        motion = TransformedReference(layout, plan.reference, carry, 0.0, moment)
-        offset = InertializationOffset(layout, motion.sample(0.0), begin, 0.0, blend_s)
+        plan = self._plan
+        motion = TransformedReference(self._layout, plan.reference, carry, 0.0, moment)
         clock = TickClock(plan.simulation.rate_hz)
         tracked = TrackedReference(plan.character, plan.reference, clock, episode_ns=0)
         tracked.follows_velocity = self._follows_velocity
-        tracked.target = ClipTarget(self._exercise.name, motion, offset)
+        tracked.target = ClipTarget.entered(self._exercise.name, motion, begin, 0.0, blend_s)
         return TrainedReference(tracked, blend_s, wraps=False, lasts_s=lasts_s)

@@ -19,7 +19,6 @@ from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.targets import ClipTarget
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
-from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import available_clips
@@ -115,10 +114,7 @@ class Pursuit(Reaction):
         start = float(self._kit.posture.heading(first.orientations_xyzw[0]))
         carry = PlanarTransform.leading(first.position[:3], start, seen.position[:3], heading)
         moved = TransformedReference(self._layout, motion, carry, seen.time)
-        offset = InertializationOffset(
-            self._layout, moved.sample(seen.time), self._desired(seen), seen.time, _ONTO
-        )
-        self._target = ClipTarget(clip, moved, offset)
+        self._target = ClipTarget.entered(clip, moved, self._desired(seen), seen.time, _ONTO)
         self._strike_until = seen.time + library.duration(clip)
         facts = {"to": "clip", "assistance": seen.assistance(), "clip": clip}
         self._begin(seen.time, Mode.BLEND, self._go_on_striking, self._phase_gains.firm, **facts)

@@ -257,10 +257,8 @@ class Reaction:
         place = motion.sample(match.time).configuration.position
         carry = PlanarTransform.leading(place, 0.0, self._led(seen), match.turn)
         moved = TransformedReference(self._layout, motion, carry, seen.time, match.time)
-        offset = InertializationOffset(
-            self._layout, moved.sample(seen.time), self._desired(seen), seen.time, duration
-        )
-        self._target = ClipTarget(match.clip, moved, offset)
+        before = self._desired(seen)
+        self._target = ClipTarget.entered(match.clip, moved, before, seen.time, duration)
 
     def _come_back(self, seen: Observation, carry: PlanarTransform, duration: float) -> None:
         """Go over to the own reference, carried."""

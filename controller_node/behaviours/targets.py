@@ -47,6 +47,19 @@ class ClipTarget:
     motion: TransformedReference
     offset: InertializationOffset
 
+    @classmethod
+    def entered(
+        cls,
+        clip: str,
+        motion: TransformedReference,
+        body: ReferenceState,
+        start: float,
+        blend: float,
+    ) -> "ClipTarget":
+        """One that goes over to a motion from a state at `start`, within `blend`; both in s."""
+        there = motion.sample(start)
+        return cls(clip, motion, InertializationOffset(motion.layout, there, body, start, blend))
+
     def state_at(self, time: float, own: ReferenceState) -> ReferenceState:
         """The motion's state, with the rest of the offset."""
         return self.offset.applied(self.motion.sample(time), time)

@@ -1,7 +1,6 @@
 """The planner that a controller's parameters say."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -117,13 +116,6 @@ def _choose_policies(character: Character, values: Values, clips: Sequence[str])
     from controller_node.planner.policy.choosing import choose_policies  # compiled code
 
     return choose_policies(character, values, clips)
-
-
-def policies_read(character: Character, values: Values, clips: Sequence[str]) -> dict[str, Path]:
-    """The files of policies in use, see `choosing.policies_read`."""
-    from controller_node.planner.policy.choosing import policies_read
-
-    return policies_read(character, values, clips)
 
 
 def make_commands_in_flight(
