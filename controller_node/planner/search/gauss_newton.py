@@ -16,8 +16,8 @@ import math
 
 import numpy as np
 
-from controller_node.planner.compiled import linear
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled import linear
 from msgs_config.geometry import fixed_order
 
 _RIDGE = 20.0  # ridge, in the samples' variance, of a correction of known sensitivities

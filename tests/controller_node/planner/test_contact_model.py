@@ -8,7 +8,6 @@ import pytest
 
 from controller_node.control_laws import GainArrays, stable_pd_effort
 from controller_node.parameters import make_controller_settings, resolve_for
-from controller_node.planner.compiled import linear
 from controller_node.planner.compiled.draws import normal_draws
 from controller_node.planner.compiled.rollout import Desired, RolloutModel, let_act
 from controller_node.planner.contact_model import ContactModel
@@ -19,7 +18,7 @@ from controller_node.references.offsets import Offsets
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.clips.reading import read_clip
-from msgs_config.compiled import mass_matrix, soft_limits
+from msgs_config.compiled import linear, mass_matrix, soft_limits
 from msgs_config.geometry import rotations
 from msgs_config.messages.state import StampedState
 from sim_node.physics.passive_forces import PassiveForces

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from controller_node.planner.compiled.decorator import compiled
 from msgs_config.arrays import FloatArray
+from msgs_config.compiled.decorator import compiled
 
 
 @compiled
