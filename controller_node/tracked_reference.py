@@ -7,7 +7,8 @@ import numpy as np
 
 from controller_node.behaviours.targets import Target
 from controller_node.references.base import Reference, ReferenceState, SampledTogether
-from controller_node.references.steering.reference import Course, Steered, SteeredReference
+from controller_node.references.steering.course import Course
+from controller_node.references.steering.reference import Steered, SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.references.trajectory import TrajectoryPoints, TrajectoryReference
 from controller_node.references.transformed import PlanarTransform, TransformedReference

@@ -15,7 +15,8 @@ from benchmarks.tables.case import Case
 from controller_node.behaviours.base import Mode
 from controller_node.parameters import make_controller
 from controller_node.planner.anchor import Anchor
-from controller_node.references.steering.reference import Course, SteeredReference
+from controller_node.references.steering.course import Course
+from controller_node.references.steering.reference import SteeredReference
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import SimulationError

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from controller_node.behaviours.targets import Target
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 from controller_node.references.transformed import PlanarTransform
 from controller_node.registry import Registry
 from msgs_config.arrays import FloatArray

@@ -30,7 +30,7 @@ from controller_node.behaviours.state_machine.situation import Situation, quanti
 from controller_node.behaviours.state_machine.support import FootContact
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 from controller_node.references.steering.velocity import within
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray

@@ -8,7 +8,7 @@ from controller_node.behaviours.state_machine.body import BodyState, Foot, in_fr
 from controller_node.behaviours.state_machine.description import STEP, State
 from controller_node.behaviours.state_machine.legs.leg import Leg
 from controller_node.behaviours.state_machine.legs.stepping import sway_of_course
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 from msgs_config.geometry.scalars import Vector, add, subtract
 
 _LEAST_HEIGHT = 0.3  # m, of the centre of mass, for the rate of the pendulum

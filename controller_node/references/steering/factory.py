@@ -1,13 +1,10 @@
 """The clips of the reference `steered`, and what they make."""
 
-import numpy as np
-
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.clip import ClipReference
 from controller_node.references.steering.gait import Gait, cycle_of, standing_cycle
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
-from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import expand_clips, read_clip
 from msgs_config.errors import ConfigurationError
@@ -47,14 +44,12 @@ def _steered(character: Character, values: Values) -> Motion:
             raise ConfigurationError(f"clip '{name}' ends; to steer, it must wrap")
         clamped += frames.clamped
         clip = ClipReference(character.layout, frames)
-        cycles.append(cycle_of(name, clip, float(frames.times[-1])))
+        cycles.append(cycle_of(name, clip, float(frames.times[-1]), character))
     if gait.clips:
         cycles.sort(key=lambda cycle: cycle.speed)
-    rest: FloatArray = np.array(character.rest_position)
-    standing = standing_cycle(character.layout.configuration(rest), cycles[0].period)
     reference = SteeredReference(
         character,
-        Gait([standing, *cycles]),
+        Gait(character.layout, [standing_cycle(character, cycles[0]), *cycles]),
         SteeringLimits.of(values),
         rate_hz=SharedSettings.of(values).rate,
     )

@@ -8,13 +8,17 @@ a standing pose is the slowest of the cycles here.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from controller_node.references.base import Reference
+from controller_node.references.steering.course import Footprint
+from controller_node.references.steering.footsteps import FootCycle, find_foot_cycle
+from controller_node.references.steering.legs import Legs
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.character.layout import GeneralizedPosition, JointLayout
+from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order, rotations
 
@@ -25,28 +29,34 @@ _MOST_TURN = 0.5  # rad a cycle, at most; the turn is taken out
 
 @dataclass(frozen=True)
 class GaitCycle:
-    """One cycle along x: poses at equal steps of its phase, above a point that moves evenly."""
+    """One cycle along x: poses at equal steps of its phase, above a point that moves evenly.
+
+    Behind the body's coordinates are those of its f feet: places, and orientations.
+    """
 
     stride: float  # m a cycle
     period: float  # s
-    positions: FloatArray  # (r + 1, n), but for rotations; the last is the first once more
-    orientations_xyzw: FloatArray  # (r + 1, k, 4)
+    positions: FloatArray  # (r + 1, n + 3f), but for rotations; the last is the first once more
+    orientations_xyzw: FloatArray  # (r + 1, k + f, 4)
+    foot_cycles: tuple[FootCycle, ...]  # (f,), or none if a foot stands otherwise than once
 
     @property
     def speed(self) -> float:
         """Mean speed in m/s."""
         return self.stride / self.period
 
-    def pose(self, phase: float) -> GeneralizedPosition:
-        """The pose at a phase from 0 to 1; only `orientations_xyzw` has its rotations."""
+    def at(self, phase: float) -> GeneralizedPosition:
+        """Body and feet at a phase from 0 to 1; only `orientations_xyzw` has rotations."""
         rows = len(self.positions) - 1
         row = min(int(phase * rows), rows - 1)
-        pair = slice(row, row + 2)
-        pose = GeneralizedPosition(self.positions[pair], self.orientations_xyzw[pair])
-        return _between(_row(pose, 0), _row(pose, 1), phase * rows - row)
+        a, b = (
+            GeneralizedPosition(self.positions[each], self.orientations_xyzw[each])
+            for each in (row, row + 1)
+        )
+        return _between(a, b, phase * rows - row)
 
 
-def cycle_of(name: str, reference: Reference, period: float) -> GaitCycle:
+def cycle_of(name: str, reference: Reference, period: float, character: Character) -> GaitCycle:
     """The cycle of a reference that repeats its pose every `period` s, turned to go along x.
 
     Raises:
@@ -70,27 +80,60 @@ def cycle_of(name: str, reference: Reference, period: float) -> GaitCycle:
     positions[:, :2] -= fixed_order.mean(positions[:-1, :2], axis=0)
     straight = [rotations.about_z(-heading - bend * (phase - 0.5)) for phase in phases.tolist()]
     turns[:, 0] = rotations.multiply(np.array(straight), turns[:, 0])
-    return GaitCycle(stride, period, positions, turns)
+    n, k = positions.shape[1], turns.shape[1]
+    positions, turns = _with_feet(character, positions, turns)
+    at_rest = Legs(character).feet(rest_pose(character)).orientations_xyzw
+    places = positions[:, n:].reshape(len(positions), -1, 3)
+    found = [
+        find_foot_cycle(places[:, foot], turns[:, k + foot], stride, upright)
+        for foot, upright in enumerate(at_rest)
+    ]
+    once = tuple(each for each in found if each is not None)
+    return GaitCycle(stride, period, positions, turns, once if len(once) == len(found) else ())
 
 
-def standing_cycle(pose: GeneralizedPosition, period: float) -> GaitCycle:
-    """A pose as a cycle that goes nowhere."""
-    position = pose.position.copy()
+def standing_cycle(character: Character, walk: GaitCycle) -> GaitCycle:
+    """The pose at rest as a cycle that goes nowhere; feet stand in it when they do in a walk."""
+    pose = rest_pose(character)
+    positions, turns = _with_feet(
+        character, np.array([pose.position] * 2), np.array([pose.orientations_xyzw] * 2)
+    )
+    places = positions[0, len(pose.position) :].reshape(-1, 3).tolist()
+    cycles = [
+        replace(cycle, middle=Footprint(complex(x, y), 0.0))
+        for cycle, (x, y, _) in zip(walk.foot_cycles, places, strict=False)
+    ]
+    return GaitCycle(0.0, walk.period, positions, turns, tuple(cycles))
+
+
+def rest_pose(character: Character) -> GeneralizedPosition:
+    """How a character rests, above the origin."""
+    position: FloatArray = np.array(character.rest_position)
     position[:2] = 0.0
-    turns = pose.orientations_xyzw
-    return GaitCycle(0.0, period, np.array([position, position]), np.array([turns, turns]))
+    return character.layout.configuration(position)
+
+
+def _with_feet(
+    character: Character, positions: FloatArray, turns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Coordinates of bodies (r, n) and (r, k, 4), with those of their feet behind."""
+    legs = Legs(character)
+    feet = [legs.feet(GeneralizedPosition(*pose)) for pose in zip(positions, turns, strict=True)]
+    places = np.array([each.position for each in feet])
+    facing = np.array([each.orientations_xyzw for each in feet])
+    return np.concatenate((positions, places), axis=1), np.concatenate((turns, facing), axis=1)
 
 
 class Gait:
     """Cycles of rising speed, as one motion of any speed up to the fastest."""
 
-    def __init__(self, cycles: Sequence[GaitCycle]) -> None:
+    def __init__(self, layout: JointLayout, cycles: Sequence[GaitCycle]) -> None:
         """Blend two cycles or more.
 
         Raises:
             ConfigurationError: one is not faster than the one before.
         """
-        self._cycles = cycles
+        self._cycles, self._size = cycles, (layout.size, len(layout.rotation_entries))
         self._speeds = [cycle.speed for cycle in cycles]
         for slow, fast in zip(self._speeds, self._speeds[1:], strict=False):
             if fast <= slow:
@@ -113,25 +156,36 @@ class Gait:
         share = (speed - slow.speed) / (fast.speed - slow.speed)
         return slow, fast, min(max(share, 0.0), 1.0)
 
+    def stride(self, speed: float) -> float:
+        """Length of a cycle in m at a speed in m/s."""
+        slow, fast, share = self._around(abs(speed))
+        return slow.stride + share * (fast.stride - slow.stride)
+
     def frequency(self, speed: float) -> float:
         """Cycles a second at a speed in m/s; negative backwards, and zero for one that stands."""
-        slow, fast, share = self._around(abs(speed))
-        stride = slow.stride + share * (fast.stride - slow.stride)
+        stride = self.stride(speed)
         return speed / stride if stride > 0.0 else 0.0
 
-    def pose(self, speed: float, phase: float) -> GeneralizedPosition:
-        """The pose at a speed in m/s and a phase from 0 to 1, above the origin, along x.
+    def at(self, speed: float, phase: float) -> tuple[GeneralizedPosition, GeneralizedPosition]:
+        """Body and feet at a speed in m/s and a phase from 0 to 1, above the origin, along x.
 
-        Only `orientations_xyzw` has its rotations.
+        Only `orientations_xyzw` has rotations. Feet have places (3f,) and orientations (f, 4).
         """
         slow, fast, share = self._around(abs(speed))
-        if share == 0.0:
-            return slow.pose(phase)
-        return _between(slow.pose(phase), fast.pose(phase), share)
+        both = slow.at(phase)
+        if share != 0.0:
+            both = _between(both, fast.at(phase), share)
+        n, k = self._size
+        return (
+            GeneralizedPosition(both.position[:n], both.orientations_xyzw[:k]),
+            GeneralizedPosition(both.position[n:], both.orientations_xyzw[k:]),
+        )
 
-
-def _row(poses: GeneralizedPosition, row: int) -> GeneralizedPosition:
-    return GeneralizedPosition(poses.position[row], poses.orientations_xyzw[row])
+    def foot_cycles(self, speed: float) -> tuple[FootCycle, ...]:
+        """When each foot stands at a speed in m/s; none where one does otherwise than once."""
+        slow, fast, share = self._around(abs(speed))
+        pairs = zip(slow.foot_cycles, fast.foot_cycles, strict=False)
+        return tuple(a.towards(b, share) for a, b in pairs)
 
 
 def _between(a: GeneralizedPosition, b: GeneralizedPosition, share: float) -> GeneralizedPosition:

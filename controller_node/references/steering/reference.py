@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.references.base import ReferenceState
+from controller_node.references.steering.course import Course
 from controller_node.references.steering.gait import Gait
+from controller_node.references.steering.legs import Legs
+from controller_node.references.steering.stepping import Stepping
 from controller_node.references.steering.velocity import (
     SteeringLimits,
     VelocityCommand,
     VelocityRegion,
-    within,
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
@@ -23,24 +25,8 @@ from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MAX_WAITING = 1000  # commands
-_LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
 _LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead: feet in front and behind are off the ground
 _GRAVITY = 9.81  # m/s^2
-
-
-@dataclass(frozen=True)
-class Course:
-    """The motion over the ground at a tick; velocities in the character's own frame."""
-
-    x: float = 0.0  # m, world
-    y: float = 0.0
-    heading: float = 0.0  # rad
-    forward: float = 0.0  # m/s
-    left: float = 0.0  # m/s
-    turn: float = 0.0  # rad/s
-    phase: float = 0.0  # phase of the gait's cycle, from 0 to 1
-    acceleration_ahead: float = 0.0  # m/s^2, smoothed; in the character's own frame
-    acceleration_left: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -71,15 +57,17 @@ class SteeredReference:
         limits: SteeringLimits,
         *,
         rate_hz: int,
-        start: tuple[int, Course] = (0, Course()),
+        start: tuple[int, Course] | None = None,
         commands: Sequence[VelocityCommand] = (),
     ) -> None:
-        """Begin at a tick on a course; commands are in the order of their ticks."""
+        """Begin at a tick on a course, else standing; commands are in the order of their ticks."""
         self._character, self._gait = character, gait
+        self._legs, self._stepping = Legs(character), Stepping(gait)
         self.limits = limits
         self._rate = rate_hz
-        self._start, self._commands = start, commands
-        self._first, self._courses = start[0], [start[1]]
+        self._start = (0, self._stepping.standing()) if start is None else start
+        self._commands = commands
+        self._first, self._courses = self._start[0], [self._start[1]]
         self._poses: dict[int, GeneralizedPosition] = {}
         self._no_acceleration = np.zeros(character.layout.size)
 
@@ -155,26 +143,9 @@ class SteeredReference:
 
     def _advanced(self, course: Course, tick: int) -> Course:
         """The course at a tick, from that of the tick before."""
-        limits, period, wanted = self.limits, 1.0 / self._rate, self._wanted(tick - 1)
-        forward = limits.approach(course.forward, wanted.forward, period)
-        left = limits.approach(course.left, wanted.left, period)
-        turn = course.turn + within(wanted.turn - course.turn, limits.turn_acceleration * period)
-        heading = math.remainder(course.heading + turn * period, math.tau)
-        cosine, sine = math.cos(heading), math.sin(heading)
-        ahead = (forward - course.forward) / period - turn * left
-        leftward = (left - course.left) / period + turn * forward
-        share = min(period / _LEAN_TIME_CONSTANT, 1.0)
-        return Course(
-            course.x + period * (cosine * forward - sine * left),
-            course.y + period * (sine * forward + cosine * left),
-            heading,
-            forward,
-            left,
-            turn,
-            (course.phase + self._gait.frequency(forward) * period) % 1.0,
-            course.acceleration_ahead + share * (ahead - course.acceleration_ahead),
-            course.acceleration_left + share * (leftward - course.acceleration_left),
-        )
+        period = 1.0 / self._rate
+        moved = course.advanced(self._wanted(tick - 1), self.limits, period)
+        return self._stepping.advanced(moved, period)
 
     def _wanted(self, tick: int) -> VelocityCommand:
         """The command in force at a tick."""
@@ -195,16 +166,22 @@ class SteeredReference:
         return self._poses[tick]
 
     def _placed(self, course: Course) -> GeneralizedPosition:
-        """The gait's pose where a course is, leaning about the root: the feet give way."""
-        pose = self._gait.pose(course.forward, course.phase)
+        """The gait's pose where a course is, leaning about the root, with its feet on their prints.
+
+        Without prints the feet give way as it leans.
+        """
+        pose, feet = self._gait.at(course.pace, course.phase)
         position, turns = pose.position.copy(), pose.orientations_xyzw.copy()
         about_z = rotations.about_z(course.heading)
         lean, upright = _lean(course)
         position[:3] = rotations.rotate(about_z, position[:3])
         position[:3] = (position[0] + course.x, position[1] + course.y, upright * position[2])
         turns[0] = rotations.multiply(rotations.multiply(about_z, lean), turns[0])
+        placed = GeneralizedPosition(position, turns)
+        if course.feet:
+            self._legs.reach(placed, self._stepping.on_prints(feet, course))
         position[self._character.layout.rotation_entries] = rotations.log(turns)
-        return GeneralizedPosition(position, turns)
+        return placed
 
 
 def _lean(course: Course) -> tuple[FloatArray, float]:

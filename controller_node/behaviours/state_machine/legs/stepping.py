@@ -4,7 +4,7 @@ import math
 
 from controller_node.behaviours.state_machine import laws
 from controller_node.behaviours.state_machine.description import FootPlacement, State
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 
 _SOLE_LENGTH = 0.2  # m, a sole's length
 

@@ -13,7 +13,7 @@ from controller_node.behaviours.state_machine.legs.footing import ReachingFoot, 
 from controller_node.behaviours.state_machine.legs.leg import FootPose
 from controller_node.behaviours.state_machine.machine import MachineKit
 from controller_node.behaviours.state_machine.situation import Situation, situation_of
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 from msgs_config.geometry.scalars import Vector, subtract
 from tests.support.physics import character
 

@@ -13,7 +13,7 @@ from controller_node.behaviours.state_machine.legs.stepping import (
     step_width,
     sway_of_course,
 )
-from controller_node.references.steering.reference import Course
+from controller_node.references.steering.course import Course
 
 RATE = 3.3  # 1/s
 SIDES = (1.0, -1.0)

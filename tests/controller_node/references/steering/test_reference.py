@@ -83,7 +83,7 @@ def lean_of(reference: SteeredReference, start: float) -> tuple[float, float]:
     for tick in range(round(start * RATE), round((start + 1.0) * RATE)):
         course = reference.course(tick)
         turn = reference.sample(tick / RATE).configuration.orientations_xyzw[0]
-        upright = reference._gait.pose(course.forward, course.phase).orientations_xyzw[0]
+        upright = reference._gait.at(course.pace, course.phase)[0].orientations_xyzw[0]
         lean = rotations.multiply(turn, rotations.conjugate(upright))
         x, y, z = rotations.rotate(lean, np.array((0.0, 0.0, 1.0))).tolist()
         cosine, sine = math.cos(course.heading), math.sin(course.heading)
@@ -116,7 +116,7 @@ def test_leaning_the_root_stays_above_the_course_and_comes_lower() -> None:
     course = bend.course(6 * RATE)
 
     position = bend.sample(6.0).configuration.position
-    upright = bend._gait.pose(course.forward, course.phase).position
+    upright = bend._gait.at(course.pace, course.phase)[0].position
     assert math.dist(position[:2], (course.x, course.y)) == pytest.approx(
         float(np.linalg.norm(upright[:2]))
     )

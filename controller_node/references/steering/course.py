@@ -1,0 +1,80 @@
+"""Where a steered character goes over the ground, tick by tick."""
+
+import cmath
+import math
+from dataclasses import dataclass, replace
+
+from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+
+_LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
+_SMALL = 1e-6  # rad
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Where a foot stands on the ground, or would if it came down now."""
+
+    place: complex  # m, x + 1j y
+    heading: float  # rad, against how the foot faces at rest
+
+    def moved_by(self, other: "Footprint") -> "Footprint":
+        """It, where it was said in the frame of another one."""
+        place = other.place + self.place * cmath.rect(1.0, other.heading)
+        return Footprint(place, self.heading + other.heading)
+
+
+@dataclass(frozen=True)
+class Course:
+    """The motion over the ground at a tick; velocities in the character's own frame."""
+
+    x: float = 0.0  # m, world
+    y: float = 0.0
+    heading: float = 0.0  # rad
+    forward: float = 0.0  # m/s
+    left: float = 0.0  # m/s
+    turn: float = 0.0  # rad/s
+    phase: float = 0.0  # phase of the gait's cycle, from 0 to 1
+    acceleration_ahead: float = 0.0  # m/s^2, smoothed; in the character's own frame
+    acceleration_left: float = 0.0
+    pace: float = 0.0  # m/s, the speed whose poses are shown
+    is_backward: bool = False  # whether the cycle runs backward
+    feet: tuple[Footprint, ...] = ()  # in the world
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether any velocity is left."""
+        return self.forward != 0.0 or self.left != 0.0 or self.turn != 0.0
+
+    @property
+    def frame(self) -> Footprint:
+        """The character's own frame on the ground."""
+        return Footprint(complex(self.x, self.y), self.heading)
+
+    def after(self, time: float) -> Footprint:
+        """The own frame `time` s later, if it goes on at these velocities: along an arc."""
+        angle = self.turn * time
+        chord = 1.0 if abs(angle) < _SMALL else math.sin(0.5 * angle) / (0.5 * angle)
+        way = cmath.rect(time * chord, 0.5 * angle) * complex(self.forward, self.left)
+        return Footprint(way, angle).moved_by(self.frame)
+
+    def advanced(self, wanted: VelocityCommand, limits: SteeringLimits, period: float) -> "Course":
+        """A tick of so many seconds later, but for what follows from the gait."""
+        forward = limits.approach(self.forward, wanted.forward, period)
+        left = limits.approach(self.left, wanted.left, period)
+        turn = self.turn + within(wanted.turn - self.turn, limits.turn_acceleration * period)
+        heading = math.remainder(self.heading + turn * period, math.tau)
+        cosine, sine = math.cos(heading), math.sin(heading)
+        ahead = (forward - self.forward) / period - turn * left
+        leftward = (left - self.left) / period + turn * forward
+        share = min(period / _LEAN_TIME_CONSTANT, 1.0)
+        return replace(
+            self,
+            x=self.x + period * (cosine * forward - sine * left),
+            y=self.y + period * (sine * forward + cosine * left),
+            heading=heading,
+            forward=forward,
+            left=left,
+            turn=turn,
+            acceleration_ahead=self.acceleration_ahead + share * (ahead - self.acceleration_ahead),
+            acceleration_left=self.acceleration_left + share * (leftward - self.acceleration_left),
+        )

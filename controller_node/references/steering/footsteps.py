@@ -1,0 +1,149 @@
+"""Feet that stay where they stand, and come down where the motion over the ground will need them.
+
+A captured cycle goes straight ahead at its own speed. Elsewhere its feet would slide: in bends, to
+the side, on the spot, at other speeds. So each foot has a footprint of its own. While the cycle has
+the foot on the ground, the print stays; then it swings to where the character, at its present
+velocity, will be at mid-stance. At the cycle's own velocity this is what the cycle does itself.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from controller_node.references.steering.course import Course, Footprint
+from msgs_config.arrays import FloatArray
+from msgs_config.geometry import rotations
+
+_STANDING = 0.35  # share of the mean speed over the ground, below which a foot stands
+_STRAY = 0.1  # share of a cycle in which a foot may do otherwise than once a cycle
+_NEAR, _FACING = 0.01, 0.05  # m and rad from where it stands at ease, at which a foot is there
+_GRAVITY = 9.81  # m/s^2
+
+
+@dataclass(frozen=True)
+class FootCycle:
+    """When in a cycle a foot stands, and where at mid-stance."""
+
+    touch_down: float  # phase, from 0 to 1
+    duty: float  # share of the cycle for which it stands
+    middle: Footprint  # against a point that moves evenly
+
+    def since_touch_down(self, phase: float) -> float:
+        """Phase since the last touch-down, from 0 to 1."""
+        return (phase - self.touch_down) % 1.0
+
+    def swung(self, phase: float, is_backward: bool) -> float:
+        """How much of its swing is done, from 0 to 1; 0 while it stands."""
+        share = (self.since_touch_down(phase) - self.duty) / (1.0 - self.duty)
+        if share <= 0.0:
+            return 0.0
+        return 1.0 - share if is_backward else share
+
+    def to_middle(self, phase: float, is_backward: bool) -> float:
+        """Phase to the middle of the next stance, from within the swing before it."""
+        since = self.since_touch_down(phase)
+        return since - 0.5 * self.duty if is_backward else 1.0 + 0.5 * self.duty - since
+
+    def print_at(self, phase: float, stride: float) -> Footprint:
+        """The footprint in a frame that moves evenly ahead, by so many m a cycle."""
+        ahead = 0.5 * self.duty - self.since_touch_down(phase) + eased(self.swung(phase, False))
+        return Footprint(self.middle.place + stride * ahead, self.middle.heading)
+
+    def towards(self, other: "FootCycle", share: float) -> "FootCycle":
+        """Between it and another one."""
+        later = math.remainder(other.touch_down - self.touch_down, 1.0)
+        a, b = self.middle, other.middle
+        return FootCycle(
+            (self.touch_down + share * later) % 1.0,
+            self.duty + share * (other.duty - self.duty),
+            Footprint(
+                a.place + share * (b.place - a.place), a.heading + share * (b.heading - a.heading)
+            ),
+        )
+
+
+def eased(share: float) -> float:
+    """From 0 to 1, slow at both ends."""
+    return share * share * (3.0 - 2.0 * share)
+
+
+def find_foot_cycle(
+    places: FloatArray, turns_xyzw: FloatArray, stride: float, at_rest_xyzw: FloatArray
+) -> FootCycle | None:
+    """When a foot stands in a cycle along x; None unless it does once.
+
+    Args:
+        places: Of the foot (r + 1, 3) at equal steps of phase, m, in a frame that moves evenly.
+        turns_xyzw: Its orientations (r + 1, 4).
+        stride: Length of a cycle, m.
+        at_rest_xyzw: Its orientation (4,) as the character rests, facing along x.
+    """
+    rows = len(places) - 1
+    speeds = 1.0 + rows / stride * (places[1:, 0] - places[:-1, 0])
+    stands = (speeds < _STANDING).tolist()
+    runs = sorted(
+        (_length(stands, row), row) for row in range(rows) if stands[row] and not stands[row - 1]
+    )
+    if not runs or stands.count(True) - runs[-1][0] > _STRAY * rows:
+        return None
+    length, first = runs[-1]
+    row = (first + length // 2) % rows
+    x, y, _ = places[row].tolist()
+    facing = rotations.multiply(turns_xyzw[row], rotations.conjugate(at_rest_xyzw))
+    return FootCycle(
+        first / rows, length / rows, Footprint(complex(x, y), float(rotations.yaw(facing)))
+    )
+
+
+def _length(stands: Sequence[bool], first: int) -> int:
+    """Rows from a first one on for which a foot stands."""
+    return next(
+        (more for more in range(len(stands)) if not stands[(first + more) % len(stands)]),
+        len(stands),
+    )
+
+
+def at_ease(middle: Footprint, course: Course, frequency: float, height: float) -> Footprint:
+    """Where a foot is at mid-stance, in the character's own frame.
+
+    Off the middle of its cycle's stance by as much as brings the ground's force through the root,
+    `height` m high, as a course's acceleration asks for; and farther out while going aside, so that
+    feet do not meet, which are nearest half a cycle after one came down.
+    """
+    lean = complex(course.acceleration_ahead, course.acceleration_left) / _GRAVITY
+    aside = 0.0 if frequency == 0.0 else 0.25 * abs(course.left) / frequency
+    out = 1j * math.copysign(aside, middle.place.imag)
+    return Footprint(middle.place + out - height * lean, middle.heading)
+
+
+def stepped(
+    foot: Footprint, cycle: FootCycle, ease: Footprint, before: float, course: Course, rate: float
+) -> Footprint:
+    """A foot's print in the world at a tick, from that of the tick before.
+
+    Args:
+        foot: The print.
+        cycle: Its cycle.
+        ease: Where it is to be at mid-stance, in the character's own frame.
+        before: The phase at the tick before.
+        course: The course at the tick, with its phase.
+        rate: Cycles a second.
+    """
+    was, now = (cycle.swung(phase, course.is_backward) for phase in (before, course.phase))
+    if was == now or (now == 0.0 and was < 0.5):
+        return foot
+    time = (
+        cycle.to_middle(course.phase, course.is_backward) / rate if now else 0.5 * cycle.duty / rate
+    )
+    target = ease.moved_by(course.after(time))
+    left = 1.0 - eased(was)
+    share = 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
+    turn = math.remainder(target.heading - foot.heading, math.tau)
+    return Footprint(foot.place + share * (target.place - foot.place), foot.heading + share * turn)
+
+
+def is_at_ease(foot: Footprint, ease: Footprint, course: Course) -> bool:
+    """Whether a foot is where the character needs it if it does not move."""
+    target = ease.moved_by(course.frame)
+    turn = math.remainder(target.heading - foot.heading, math.tau)
+    return abs(target.place - foot.place) < _NEAR and abs(turn) < _FACING

@@ -1,0 +1,83 @@
+"""When a steered character steps, how fast, and where its feet are by that."""
+
+import cmath
+from dataclasses import replace
+
+import numpy as np
+
+from controller_node.references.steering import footsteps
+from controller_node.references.steering.course import Course, Footprint
+from controller_node.references.steering.gait import Gait
+from controller_node.references.steering.velocity import within
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.geometry import rotations
+
+_LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are lifted as those
+_PACE_TIME = 0.4  # s in which the pace changes by the slowest captured speed, at least
+
+
+class Stepping:
+    """The steps of a gait.
+
+    Where each foot of each cycle stands once, feet stay where they stand (see `footsteps`), and
+    steps go on until all are where the character stands at ease; where it goes back, the cycle
+    runs backward, from when no foot swings on. Else the gait's feet slide.
+    """
+
+    def __init__(self, gait: Gait) -> None:
+        self._gait = gait
+        self._height = float(gait.at(0.0, 0.0)[0].position[2])  # m, of the root
+
+    def standing(self) -> Course:
+        """Standing at the origin."""
+        cycles = self._gait.foot_cycles(0.0)
+        return Course(feet=tuple(cycle.middle for cycle in cycles))
+
+    def advanced(self, course: Course, period: float) -> Course:
+        """A course with the phase, the pace and the feet of its tick; as yet of the tick before."""
+        if not course.feet:
+            speed = course.forward
+            phase = (course.phase + self._gait.frequency(speed) * period) % 1.0
+            return replace(course, phase=phase, pace=abs(speed))
+        walk = self._gait.speeds[1]
+        speed = max(abs(complex(course.forward, course.left)), _LEAST_PACE * walk)
+        rate, ease = self._gait.frequency(speed), self._at_ease(course)
+        steps = course.is_moving or not all(
+            footsteps.is_at_ease(foot, place, course)
+            for foot, place in zip(course.feet, ease, strict=True)
+        )
+        most = walk / _PACE_TIME * period
+        pace = course.pace + within((speed if steps else 0.0) - course.pace, most)
+        if not steps:
+            return replace(course, pace=pace)
+        cycles = self._gait.foot_cycles(pace)
+        backward = course.is_backward
+        if course.forward and not any(cycle.swung(course.phase, backward) for cycle in cycles):
+            backward = course.forward < 0.0
+        by = -rate * period if backward else rate * period
+        phase = (course.phase + by) % 1.0
+        there = replace(course, pace=pace, phase=phase, is_backward=backward)
+        feet = (
+            footsteps.stepped(*each, course.phase, there, rate)
+            for each in zip(course.feet, cycles, ease, strict=True)
+        )
+        return replace(there, feet=tuple(feet))
+
+    def on_prints(self, feet: GeneralizedPosition, course: Course) -> GeneralizedPosition:
+        """The gait's feet, places (3f,) in m and orientations (f, 4), carried to their prints."""
+        stride, cycles = self._gait.stride(course.pace), self._gait.foot_cycles(course.pace)
+        own = [cycle.print_at(course.phase, stride) for cycle in cycles]
+        angles = [foot.heading - each.heading for foot, each in zip(course.feet, own, strict=True)]
+        about_z = np.array([rotations.about_z(angle) for angle in angles])
+        places = feet.position.copy()
+        for row, (foot, each, angle) in enumerate(zip(course.feet, own, angles, strict=True)):
+            x, y = places[3 * row : 3 * row + 2].tolist()
+            place = foot.place + (complex(x, y) - each.place) * cmath.rect(1.0, angle)
+            places[3 * row : 3 * row + 2] = place.real, place.imag
+        return GeneralizedPosition(places, rotations.multiply(about_z, feet.orientations_xyzw))
+
+    def _at_ease(self, course: Course) -> list[Footprint]:
+        """Where the feet are at mid-stance, in the character's own frame."""
+        rate = self._gait.frequency(max(abs(course.forward), _LEAST_PACE * self._gait.speeds[1]))
+        cycles = self._gait.foot_cycles(course.forward)
+        return [footsteps.at_ease(cycle.middle, course, rate, self._height) for cycle in cycles]

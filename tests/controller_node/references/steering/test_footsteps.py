@@ -1,0 +1,178 @@
+"""Feet of a steered reference: those on the ground stay, the others come down where they should."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controller_node.references.clip import ClipReference
+from controller_node.references.steering.reference import SteeredReference
+from controller_node.references.steering.velocity import VelocityCommand
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.lowest_points import lowest_heights
+from msgs_config.clips.reading import read_clip
+from tests.controller_node.references.steering.test_reference import LASTING, RATE, make, steer
+from tests.support.physics import character
+
+HUMANOID = character("humanoid")
+FEET = [[link.name for link in HUMANOID.links].index(name) for name in HUMANOID.feet]
+WALK = 0.978  # m/s, the captured walk's speed
+CAPTURED_SLIDE = 0.2  # m/s, the mean of the captured walk's ankles while they stand
+BEYOND_WALK = {
+    "in a bend": (1.0, 0.0, 0.8),
+    "on the spot": (0.0, 0.0, 1.0),
+    "aside": (0.0, 0.3, 0.0),
+    "back": (-0.5, 0.0, 0.0),
+    "slow": (0.2, 0.0, 0.0),
+    "all at once": (0.4, -0.2, 0.5),
+}
+
+
+def driven(*velocity: float) -> SteeredReference:
+    return steer(make(**LASTING), VelocityCommand(0, *velocity))
+
+
+def feet_of(reference: SteeredReference, tick: int) -> tuple[FloatArray, FloatArray]:
+    """Places (f, 3) of the ankles and heights (f,) of the soles, m, by MuJoCo's kinematics."""
+    model = DynamicsModel(HUMANOID)
+    position = reference.sample(tick / RATE).configuration.position
+    model.update(position, np.zeros(HUMANOID.layout.size))
+    return model.link_poses()[0][FEET], lowest_heights(HUMANOID, model)[FEET]
+
+
+def stands(reference: SteeredReference, tick: int) -> list[bool]:
+    course, gait = reference.course(tick), reference._gait
+    cycles = gait.foot_cycles(course.pace)
+    return [cycle.swung(course.phase, course.is_backward) == 0.0 for cycle in cycles]
+
+
+def slides(reference: SteeredReference, ticks: range) -> list[float]:
+    """Speeds over the ground of feet that stand, m/s."""
+    found = []
+    for tick in ticks:
+        here, there = feet_of(reference, tick)[0], feet_of(reference, tick + 1)[0]
+        still = np.array(stands(reference, tick)) & np.array(stands(reference, tick + 1))
+        found += (RATE * np.linalg.norm((there - here)[:, :2], axis=1))[still].tolist()
+    return found
+
+
+def test_straight_ahead_at_its_own_speed_the_walk_is_the_captured_one() -> None:
+    reference = driven(WALK)
+    frames = read_clip(HUMANOID, "walk")
+    clip = ClipReference(HUMANOID.layout, frames)
+
+    for tick in range(6 * RATE, 8 * RATE, 31):
+        course, found = reference.course(tick), reference.sample(tick / RATE).configuration
+        captured = clip.sample(course.phase * float(frames.times[-1])).configuration
+        knees = [HUMANOID.layout.joint(f"{side}_knee").start for side in ("left", "right")]
+        assert found.position[knees] == pytest.approx(captured.position[knees], abs=0.05)
+        assert reference.course(tick).pace == pytest.approx(WALK)
+
+
+@pytest.mark.parametrize("velocity", BEYOND_WALK.values(), ids=BEYOND_WALK)
+def test_feet_that_stand_slide_no_more_than_captured_ones(
+    velocity: tuple[float, float, float],
+) -> None:
+    ticks = range(4 * RATE, 6 * RATE, 7)
+
+    captured = np.mean(slides(driven(WALK), ticks))
+    assert captured == pytest.approx(CAPTURED_SLIDE, abs=0.03)
+    assert np.mean(slides(driven(*velocity), ticks)) < captured + 0.03
+
+
+@pytest.mark.parametrize("velocity", BEYOND_WALK.values(), ids=BEYOND_WALK)
+def test_each_foot_is_lifted_in_turn(velocity: tuple[float, float, float]) -> None:
+    reference = driven(*velocity)
+
+    heights = np.array([feet_of(reference, tick)[1] for tick in range(4 * RATE, 6 * RATE, 5)])
+    assert heights.min() > -0.01
+    assert (heights.max(axis=0) > 0.04).all()
+    assert (heights.min(axis=1) < 0.02).all()  # one is on the ground
+
+
+def test_feet_do_not_meet_while_it_goes_aside() -> None:
+    reference = driven(0.0, 0.3, 0.0)
+
+    apart = [
+        float(np.linalg.norm(np.diff(feet_of(reference, tick)[0][:, :2], axis=0)))
+        for tick in range(4 * RATE, 6 * RATE, 5)
+    ]
+    assert min(apart) > 0.1
+
+
+@pytest.mark.parametrize("velocity", BEYOND_WALK.values(), ids=BEYOND_WALK)
+def test_told_to_stop_it_stands_on_both_feet_as_at_rest(
+    velocity: tuple[float, float, float],
+) -> None:
+    reference = steer(driven(*velocity), VelocityCommand(4 * RATE, 0.0))
+    rest = DynamicsModel(HUMANOID)
+    rest.update(np.array(HUMANOID.rest_position), np.zeros(HUMANOID.layout.size))
+    beside = np.diff(rest.link_poses()[0][FEET], axis=0)[0, 1]
+
+    places, heights = feet_of(reference, 8 * RATE)
+    assert float(np.linalg.norm(np.diff(places[:, :2], axis=0))) == pytest.approx(beside, abs=0.02)
+    assert heights == pytest.approx(0.0, abs=0.005)
+    assert reference.course(8 * RATE).phase == reference.course(9 * RATE).phase
+    still = reference.sample(8.0).velocity
+    assert still == pytest.approx(0.0, abs=1e-6)
+
+
+def test_it_stands_within_two_seconds_of_a_walk() -> None:
+    reference = steer(driven(WALK), VelocityCommand(4 * RATE, 0.0))
+
+    assert np.abs(reference.sample(6.0).velocity).max() < 0.05
+
+
+def test_a_foot_comes_down_in_front_as_far_as_the_character_goes_in_half_a_stance() -> None:
+    reference = driven(0.4)
+    frequency = reference._gait.frequency(WALK)
+
+    for tick in range(4 * RATE, 6 * RATE):
+        before, after = stands(reference, tick), stands(reference, tick + 1)
+        for foot, cycle in enumerate(reference._gait.foot_cycles(0.4)):
+            if after[foot] and not before[foot]:
+                course = reference.course(tick + 1)
+                ahead = course.feet[foot].place.real - course.x
+                expected = cycle.middle.place.real + 0.4 * 0.5 * cycle.duty / frequency
+                assert ahead == pytest.approx(expected, abs=0.01)
+
+
+def test_no_joint_jerks_where_a_drive_changes() -> None:
+    reference = steer(
+        make(**LASTING),
+        VelocityCommand(0, 1.0, 0.0, 0.3),
+        VelocityCommand(700, -0.4),
+        VelocityCommand(1400, 0.0, -0.3),
+        VelocityCommand(2100, 2.0),
+        VelocityCommand(3000, 0.0),
+    )
+
+    fastest = max(float(np.abs(reference.sample(t / RATE).velocity[6:]).max()) for t in range(4000))
+    assert fastest < 35.0  # rad/s; the captured walk's and run's is 15
+
+
+def test_in_a_bend_feet_are_outside_by_the_lean() -> None:
+    straight, bend = driven(1.5), driven(1.5, 0.0, 0.6)
+
+    def mean_left(reference: SteeredReference) -> float:
+        lefts = []
+        for tick in range(5 * RATE, 8 * RATE, 11):
+            course = reference.course(tick)
+            for foot, standing in zip(course.feet, stands(reference, tick), strict=True):
+                if standing:
+                    off = foot.place - complex(course.x, course.y)
+                    turned = off * complex(math.cos(course.heading), -math.sin(course.heading))
+                    lefts.append(turned.imag)
+        return float(np.mean(lefts))
+
+    lean = 1.5 * 0.6 / 9.81 * HUMANOID.rest_position[2]
+    assert mean_left(bend) - mean_left(straight) == pytest.approx(-lean, abs=0.04)
+
+
+def test_a_character_whose_file_names_no_feet_is_steered_without_prints() -> None:
+    reference = make("laikago", **{"steering.clips": ["walk"], **LASTING})
+    reference = steer(reference, VelocityCommand(0, 0.2))
+
+    assert reference.course(500).feet == ()
+    assert reference.course(500).phase > 0.0
