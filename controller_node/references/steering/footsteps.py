@@ -108,12 +108,24 @@ def at_ease(middle: Footprint, course: Course, frequency: float, height: float) 
 
     Off the middle of its cycle's stance by as much as brings the ground's force through the root,
     `height` m high, as a course's acceleration asks for; and farther out while going aside, so that
-    feet do not meet, which are nearest half a cycle after one came down.
+    feet do not meet: they are nearest as one comes down, half a cycle after the other one.
     """
     lean = complex(course.acceleration_ahead, course.acceleration_left) / _GRAVITY
-    aside = 0.0 if frequency == 0.0 else 0.25 * abs(course.left) / frequency
-    out = 1j * math.copysign(aside, middle.place.imag)
+    out = 1j * math.copysign(0.25 * abs(course.left) / frequency, middle.place.imag)
     return Footprint(middle.place + out - height * lean, middle.heading)
+
+
+def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> float:
+    """How far towards a foot that stands the root is, of its distance to that side, from 0 to 1.
+
+    So moves a linear inverted pendulum, `height` m high, that goes to and fro between two feet and
+    stands on each in turn (Kajita et al. 2001, "The 3D Linear Inverted Pendulum Mode").
+    """
+    since = cycle.since_touch_down(phase)
+    if since >= cycle.duty:
+        return 0.0
+    rate, half = math.sqrt(_GRAVITY / height), 0.5 * cycle.duty
+    return 1.0 - math.cosh(rate * (since - half) / frequency) / math.cosh(rate * half / frequency)
 
 
 def stepped(

@@ -172,6 +172,8 @@ class SteeredReference:
         """
         pose, feet = self._gait.at(course.pace, course.phase)
         position, turns = pose.position.copy(), pose.orientations_xyzw.copy()
+        root = self._stepping.root(complex(*position[:2].tolist()), course)
+        position[:2] = root.real, root.imag
         about_z = rotations.about_z(course.heading)
         lean, upright = _lean(course)
         position[:3] = rotations.rotate(about_z, position[:3])

@@ -13,6 +13,7 @@ from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
 _LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are lifted as those
+_EASE = 0.5  # of it: slower steps are as narrow as those
 _PACE_TIME = 0.4  # s in which the pace changes by the slowest captured speed, at least
 
 
@@ -76,8 +77,33 @@ class Stepping:
             places[3 * row : 3 * row + 2] = place.real, place.imag
         return GeneralizedPosition(places, rotations.multiply(about_z, feet.orientations_xyzw))
 
+    def root(self, place: complex, course: Course) -> complex:
+        """Where the root is in the character's own frame, of where the gait's is, m.
+
+        It sways ahead as much less as the steps are shorter; and to the foot that stands, where the
+        feet are farther apart than in a captured cycle, as a pendulum does that they keep upright.
+        """
+        if not course.feet or not course.pace:
+            return place
+        walk, back = self._gait.speeds[1], cmath.rect(1.0, -course.heading)
+        ahead = place.real * min(abs(course.forward) / course.pace, 1.0)
+        rate = self._gait.frequency(course.pace)
+        left = sum(
+            (((foot.place - course.frame.place) * back).imag - captured.middle.place.imag)
+            * footsteps.sway(cycle, course.phase, rate, self._height)
+            for foot, captured, cycle in zip(
+                course.feet,
+                self._gait.foot_cycles(max(course.pace, walk)),
+                self._gait.foot_cycles(course.pace),
+                strict=True,
+            )
+        )
+        shown = min(course.pace / (_LEAST_PACE * walk), 1.0)
+        return complex(ahead, place.imag + shown * left)
+
     def _at_ease(self, course: Course) -> list[Footprint]:
         """Where the feet are at mid-stance, in the character's own frame."""
-        rate = self._gait.frequency(max(abs(course.forward), _LEAST_PACE * self._gait.speeds[1]))
-        cycles = self._gait.foot_cycles(course.forward)
+        walk, speed = self._gait.speeds[1], abs(course.forward)
+        rate = self._gait.frequency(max(speed, _LEAST_PACE * walk))
+        cycles = self._gait.foot_cycles(max(speed, _EASE * walk) if course.is_moving else 0.0)
         return [footsteps.at_ease(cycle.middle, course, rate, self._height) for cycle in cycles]

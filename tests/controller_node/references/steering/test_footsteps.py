@@ -125,16 +125,16 @@ def test_it_stands_within_two_seconds_of_a_walk() -> None:
 
 
 def test_a_foot_comes_down_in_front_as_far_as_the_character_goes_in_half_a_stance() -> None:
-    reference = driven(0.4)
+    reference = driven(0.6)
     frequency = reference._gait.frequency(WALK)
 
     for tick in range(4 * RATE, 6 * RATE):
         before, after = stands(reference, tick), stands(reference, tick + 1)
-        for foot, cycle in enumerate(reference._gait.foot_cycles(0.4)):
+        for foot, cycle in enumerate(reference._gait.foot_cycles(0.6)):
             if after[foot] and not before[foot]:
                 course = reference.course(tick + 1)
                 ahead = course.feet[foot].place.real - course.x
-                expected = cycle.middle.place.real + 0.4 * 0.5 * cycle.duty / frequency
+                expected = cycle.middle.place.real + 0.6 * 0.5 * cycle.duty / frequency
                 assert ahead == pytest.approx(expected, abs=0.01)
 
 
@@ -168,6 +168,41 @@ def test_in_a_bend_feet_are_outside_by_the_lean() -> None:
 
     lean = 1.5 * 0.6 / 9.81 * HUMANOID.rest_position[2]
     assert mean_left(bend) - mean_left(straight) == pytest.approx(-lean, abs=0.04)
+
+
+def pressed_beside_feet(reference: SteeredReference) -> float:
+    """How far aside of the soles that stand the ground's force would act, m, on the average.
+
+    The zero moment point of the centre of mass, whose path is smoothed over 0.1 s.
+    """
+    ticks, half = range(4 * RATE, 7 * RATE), 12
+    model, path, spans = DynamicsModel(HUMANOID), [], []
+    for tick in ticks:
+        state, course = reference.sample(tick / RATE), reference.course(tick)
+        model.update(state.configuration.position, state.velocity)
+        path.append(model.centre_of_mass().copy())
+        places = model.link_poses()[0][FEET]
+        left = np.array((-math.sin(course.heading), math.cos(course.heading)))
+        lefts = [places[foot, :2] @ left for foot, on in enumerate(stands(reference, tick)) if on]
+        spans.append((left, lefts))
+    kernel = np.hanning(2 * half + 3)[1:-1] / np.hanning(2 * half + 3).sum()
+    smooth = np.array([np.convolve(row, kernel, "valid") for row in np.array(path).T]).T
+    acceleration = RATE**2 * np.diff(smooth, n=2, axis=0)
+    height = smooth[1:-1, 2:] / (9.81 + acceleration[:, 2:])
+    points = smooth[1:-1, :2] - height * acceleration[:, :2]
+    outside = []
+    for point, (left, lefts) in zip(points, spans[half + 1 :], strict=False):
+        if lefts:
+            at = float(point @ left)
+            outside.append(max(min(lefts) - 0.045 - at, at - max(lefts) - 0.045, 0.0))
+    return float(np.mean(outside))
+
+
+@pytest.mark.parametrize("velocity", BEYOND_WALK.values(), ids=BEYOND_WALK)
+def test_it_sways_so_that_feet_can_hold_it_as_well_as_in_the_captured_walk(
+    velocity: tuple[float, float, float],
+) -> None:
+    assert pressed_beside_feet(driven(*velocity)) < 1.4 * pressed_beside_feet(driven(WALK))
 
 
 def test_a_character_whose_file_names_no_feet_is_steered_without_prints() -> None:
