@@ -14,7 +14,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.compiled import linear
 from msgs_config.compiled.decorator import compiled
-from msgs_config.compiled.rotations import axes, product, rotation_vector, to_parent
+from msgs_config.compiled.rotations import axes, exp, product, rotation_vector, to_parent
 from msgs_config.geometry import scalars
 from msgs_config.geometry.scalars import Quaternion, Vector
 
@@ -25,7 +25,6 @@ _LEVER = 0.2  # m: a rad of the end counts as so much
 FIXED, HINGE, SLIDER, BALL = 0, 1, 2, 3
 """Kinds of a limb's joints."""
 
-_exp = compiled(scalars.exp)
 _cross = compiled(scalars.cross)
 
 
@@ -51,7 +50,7 @@ def _joint(limb: Limb, joints: FloatArray, k: int) -> tuple[Vector, Quaternion]:
         turn = product(turn, (joints[k, 0], joints[k, 1], joints[k, 2], joints[k, 3]))
     elif limb.kinds[k] == HINGE:
         angle = joints[k, 0]
-        turn = product(turn, _exp((angle * x, angle * y, angle * z)))
+        turn = product(turn, exp((angle * x, angle * y, angle * z)))
     elif limb.kinds[k] == SLIDER:
         way = joints[k, 0]
         a, b, c = to_parent(axes(turn), (way * x, way * y, way * z))
@@ -125,7 +124,7 @@ def _move(limb: Limb, joints: FloatArray, step: FloatArray) -> None:
     for k in range(len(limb.kinds)):
         if limb.kinds[k] == BALL:
             turn = (joints[k, 0], joints[k, 1], joints[k, 2], joints[k, 3])
-            a, b, c, d = product(turn, _exp((step[3 * k], step[3 * k + 1], step[3 * k + 2])))
+            a, b, c, d = product(turn, exp((step[3 * k], step[3 * k + 1], step[3 * k + 2])))
             size = math.sqrt(a * a + b * b + c * c + d * d)
             joints[k, 0], joints[k, 1] = a / size, b / size
             joints[k, 2], joints[k, 3] = c / size, d / size

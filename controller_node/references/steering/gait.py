@@ -19,6 +19,7 @@ from controller_node.references.steering.legs import Legs
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
+from msgs_config.compiled.rotations import blend_turns
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order, rotations
 
@@ -190,9 +191,6 @@ class Gait:
 
 def _between(a: GeneralizedPosition, b: GeneralizedPosition, share: float) -> GeneralizedPosition:
     """Linear between coordinates, along the shorter turn between rotations."""
-    inverse = rotations.conjugate(a.orientations_xyzw)
-    turn = rotations.log(rotations.multiply(inverse, b.orientations_xyzw))
-    return GeneralizedPosition(
-        a.position + share * (b.position - a.position),
-        rotations.multiply(a.orientations_xyzw, rotations.exp(share * turn)),
-    )
+    turns = np.empty_like(a.orientations_xyzw)
+    blend_turns(a.orientations_xyzw, b.orientations_xyzw, share, turns)
+    return GeneralizedPosition(a.position + share * (b.position - a.position), turns)
