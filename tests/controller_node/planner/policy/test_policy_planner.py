@@ -30,6 +30,7 @@ from controller_node.planner.compiled.observation import (
 )
 from controller_node.planner.compiled.rollout import features_against, features_of
 from controller_node.planner.contact_model import ContactModel
+from controller_node.planner.policy import choosing
 from controller_node.planner.policy.file import read_policy
 from controller_node.planner.policy.planner import PolicyPlanner
 from controller_node.references.factory import make_motion
@@ -461,7 +462,10 @@ REFUSED: dict[str, tuple[str, dict[str, object], str]] = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_it_cannot_do_is_one_clear_line(case: str, policy: str) -> None:
+def test_what_it_cannot_do_is_one_clear_line(
+    case: str, policy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(choosing, "shipped_policies", lambda: ("walk",))  # whatever is shipped
     name, given, reason = REFUSED[case]
     whole = character(name)
     clip = {"reference": "clip", "clip": "walk"} if name == "humanoid" else {}
