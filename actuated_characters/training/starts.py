@@ -1,5 +1,8 @@
 """Where episodes begin: anywhere in the references, and more often around where others fell.
 
+Some begin where runs do, in the first row: a clip may begin in the air, with a foot in the ground,
+or faster than it is anywhere else, which a start anywhere hardly meets.
+
 What is hard is a small part of most motions, such as a landing, or a step back; if all moments were
 as likely, most of what is tried would be what the policy can do already (adaptive sampling, as in
 Liao et al. 2025, "BeyondMimic").
@@ -13,6 +16,7 @@ import numpy as np
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 
 _BIN_S = 0.5  # s, about
+_BEGINNINGS = 0.1  # share of episodes that begin in the first row of a reference
 _HARD = 0.5  # share of episodes that begin by how often others fell
 _KERNEL = (0.5, 0.3, 0.2)  # what a fall counts in its own bin, and in those before it
 _KEEPS = 0.99  # of what was counted, a trace
@@ -48,6 +52,7 @@ class Starts:
         self._lows = np.concatenate([each[:-1] for each in edges])
         self._sizes = np.concatenate([np.diff(each) for each in edges])
         ends = np.cumsum(numbers).tolist()
+        self._beginnings = np.repeat([each.first for each in ranges], numbers)
         self._parts = [slice(a - b, a) for a, b in zip(ends, numbers, strict=True)]  # of bins
         self._even = self._shared(self._sizes.astype(float))
         self._weights = self._even
@@ -59,7 +64,8 @@ class Starts:
         bins = np.searchsorted(bounds, bounds[-1] * rng.random(count), side="right")
         bins = np.minimum(bins, len(bounds) - 1)
         offsets = (rng.random(count) * self._sizes[bins]).astype(np.intp)
-        rows: IntArray = self._lows[bins] + offsets
+        begins = rng.random(count) < _BEGINNINGS
+        rows: IntArray = np.where(begins, self._beginnings[bins], self._lows[bins] + offsets)
         return rows
 
     def learn(self, rows: IntArray, fell: BoolArray) -> None:
