@@ -25,6 +25,7 @@ BALL_LIFETIME = 0.6  # s, of which it flies 0.2
 MISSED = 0.2  # m that a walk is beside its clip where a ball misses it
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
 STOP = "2.5,0,0@0 0,0,0@5.5"
+JOLT, JOLT_LASTS = 5.0, 0.2  # N s, s
 _TIME = re.compile(r"(?:@|at=)([0-9.]+)")  # time of a push or a throw
 STANDS, OVER = 0.15, 0.25  # m/s, s: it stands if it is slower than this in the mean over that time
 
@@ -179,18 +180,25 @@ def measure_push(seen: Seen) -> dict[str, Fact]:
 
 
 def course_cases(kind: str, options: Options) -> Iterator[Case]:
-    """A figure of eight, walked and then run, that ends in a stop; a stop from running; moods."""
+    """A figure of eight, walked and then run, that ends in a stop; a stop from running; moods.
+
+    A jolt at its beginning comes from another side in each run, so that runs of a policy differ.
+    """
     seconds, commands, since = {
         "eight": (60.0, EIGHT, 50.4),
         "stop": (10.0, STOP, 5.5),
         "moods": (60.0, "", 0.0),
     }[kind]
     for seed in options.seeds(5):
+        side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
+        x, y = JOLT / JOLT_LASTS * math.cos(side), JOLT / JOLT_LASTS * math.sin(side)
         yield Case(
             kind,
             seconds,
             {"reference": "steered"},
-            controller=planner(seed),
+            {"wrench_duration": JOLT_LASTS},
+            planner(seed),
+            pushes=[f"root:{x!r},{y!r},0@0.3"],
             commands=commands or random_drive(SteeringLimits(), seconds, 100 + seed),
             since=since,
         )
