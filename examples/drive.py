@@ -2,7 +2,7 @@
 
     .venv/bin/python -m sim_node.main --ros-args -p character:=humanoid -p real_time_factor:=1.0
     .venv/bin/python -m controller_node.main --ros-args -p character:=humanoid \\
-        -p reference:=steered -p planner:=predictive
+        -p reference:=steered -p planner:=hybrid
     .venv/bin/python examples/drive.py
 """
 

@@ -16,6 +16,7 @@ from actuated_characters.metrics.recording_metrics import plan_errors
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.velocities import plan_velocities
 from actuated_characters.runs.planned.wrenches import plan_push
 from controller_node.behaviours.factory import choose_behaviour
 from controller_node.controller import Controller
@@ -422,6 +423,27 @@ def test_who_falls_gets_up_by_the_policy_of_that_clip(through: list[str], tmp_pa
     assert recording.modes[3].facts["clip"] in ("getup_faceup", "getup_facedown")
     assert not recording.effort[:, :6].any()
     assert main(["replay", str(run), *through]) == 0
+
+
+@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
+def test_the_shipped_steered_one_goes_where_it_is_told_to(engine: str) -> None:
+    """From standing, in a bend: 4 s, on an engine."""
+    plan = make_plan(
+        "humanoid",
+        4.0,
+        {"reference": "steered"},
+        {"engine": engine},
+        {"planner": "policy", "steering.timeout": 10.0},
+    )
+    steered, _ = plan_velocities(plan, "0.8,0,0.4@0.5")
+
+    *_, last = ticks_in_process(steered)
+
+    assert last.reference is not None
+    off = last.state.position[:2] - last.reference.position[:2]
+    assert float(np.linalg.norm(last.reference.position[:2])) > 1.5
+    assert float(np.linalg.norm(off)) < 0.2
+    assert last.state.position[2] > 0.75
 
 
 # What it refuses
