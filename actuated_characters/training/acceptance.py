@@ -39,7 +39,7 @@ def attempt(
         ActuatedCharactersError: a name or a value is wrong.
     """
     seconds, simulator = exercise.tried_s, {"engine": engine, "wrench_duration": _JOLT_LASTS}
-    controller = {**given, "planner": "policy", "policy": str(policy)}
+    controller = {"planner": "policy", **given, "policy": str(policy)}
     plan, _ = exercise.plan(seconds, simulator, controller, _OTHER_DRIVES + seed)
     side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
     force = _JOLT_NS / _JOLT_LASTS

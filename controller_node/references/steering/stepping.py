@@ -88,16 +88,15 @@ class Stepping:
         walk, back = self._gait.speeds[1], cmath.rect(1.0, -course.heading)
         ahead = place.real * min(abs(course.forward) / course.pace, 1.0)
         rate = self._gait.frequency(course.pace)
-        left = sum(
-            (((foot.place - course.frame.place) * back).imag - captured.middle.place.imag)
-            * footsteps.sway(cycle, course.phase, rate, self._height)
-            for foot, captured, cycle in zip(
-                course.feet,
-                self._gait.foot_cycles(max(course.pace, walk)),
-                self._gait.foot_cycles(course.pace),
-                strict=True,
-            )
-        )
+        left = 0.0
+        for foot, captured, cycle in zip(
+            course.feet,
+            self._gait.foot_cycles(max(course.pace, walk)),
+            self._gait.foot_cycles(course.pace),
+            strict=True,
+        ):
+            farther = ((foot.place - course.frame.place) * back).imag - captured.middle.place.imag
+            left += farther * footsteps.sway(cycle, course.phase, rate, self._height)
         shown = min(course.pace / (_LEAST_PACE * walk), 1.0)
         return complex(ahead, place.imag + shown * left)
 

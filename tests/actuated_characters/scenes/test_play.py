@@ -209,8 +209,10 @@ def test_drive_goes_where_cmd_vel_says_and_replays(
 
     assert command.exit_code == 0, command.stderr
     (recording,) = read_recordings(run)
-    assert recording.reference_position[-2, 0] > 2.0  # of the last state there is none
-    assert abs(recording.position[-1, 0] - recording.reference_position[-2, 0]) < 0.1
+    assert recording.reference_position[-2, 0] > 0.2  # of the last state there is none
+    behind = recording.position[:-1, 0] - recording.reference_position[:-1, 0]
+    assert np.abs(behind).mean() < 0.1  # it is later to speed up than the reference
+    assert recording.position[-1, 2] > 0.75
     result = replay([recording])
     assert result.difference is None
     assert result.state_hashes == {"": hash_of(run, ticks)}

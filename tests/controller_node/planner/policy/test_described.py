@@ -3,13 +3,13 @@
 import pytest
 
 from actuated_characters.runs.plan import make_plan
-from controller_node.planner.policy.file import shipped_policies
+from controller_node.planner.policy.file import STEERED, shipped_policies
 
 SAYS = "the policy of walk was trained with other {}: it may fall where it did not"
 
 
 def warnings(clip: str, planner: str = "policy", **controller: object) -> tuple[str, ...]:
-    motion = {"reference": "clip", "clip": clip}
+    motion = {"reference": STEERED} if clip == STEERED else {"reference": "clip", "clip": clip}
     return make_plan("humanoid", 1.0, motion, {}, {"planner": planner, **controller}).warnings
 
 
