@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import GeneralizedPosition, JointType
+from msgs_config.character.layout import SCALAR, GeneralizedPosition, JointType
 from msgs_config.character.model import Character
 from msgs_config.compiled import limb
 from msgs_config.compiled.limb import Limb
@@ -81,7 +81,6 @@ def _leg(character: Character, foot: str) -> _Leg:
         index = links[index].parent
     layout, joints = character.layout, [links[each].joint for each in chain]
     turning = [joint.name for joint in layout.joints if joint.rotation is not None]
-    single = (JointType.REVOLUTE, JointType.PRISMATIC)
     freedom = sum(len(joint.type.suffixes) for joint in joints)
     poses = [joint.pose_in_parent for joint in joints]
     return _Leg(
@@ -97,7 +96,7 @@ def _leg(character: Character, foot: str) -> _Leg:
         tuple(
             (row, layout.joint(joint.name).start)
             for row, joint in enumerate(joints)
-            if joint.type in single
+            if joint.type in SCALAR
         ),
         tuple(
             (row, turning.index(joint.name))

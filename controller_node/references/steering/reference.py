@@ -25,7 +25,7 @@ from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MAX_WAITING = 1000  # commands
-_LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead: feet in front and behind are off the ground
+_LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead
 _GRAVITY = 9.81  # m/s^2
 
 

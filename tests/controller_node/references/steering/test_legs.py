@@ -1,4 +1,4 @@
-"""Limbs: where MuJoCo has their ends, and joints that bring these where they are to be."""
+"""Legs: where MuJoCo has their feet, and joints that bring these where they are to be."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from msgs_config.geometry import rotations
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
-UPRIGHT = np.array(HUMANOID.rest_position)
 
 
 def frames(body: Character, pose: GeneralizedPosition) -> tuple[FloatArray, FloatArray]:
@@ -49,7 +48,7 @@ def test_feet_are_where_another_kinematics_has_them(seed: int) -> None:
     assert matrices == pytest.approx(turns.reshape(-1, 3, 3), abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(1, 9))
 def test_legs_reach_where_feet_of_another_pose_are(seed: int) -> None:
     start, goal = posed(HUMANOID, 100, 0.1), posed(HUMANOID, 100 + seed, 0.1)
     root = start.position[:6].copy(), start.orientations_xyzw[0].copy()
