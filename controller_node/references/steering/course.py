@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
 
+GRAVITY = 9.81  # m/s^2
 _LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
 _SMALL = 1e-6  # rad
 
@@ -44,6 +45,14 @@ class Course:
     def is_moving(self) -> bool:
         """Whether any velocity is left."""
         return self.forward != 0.0 or self.left != 0.0 or self.turn != 0.0
+
+    @property
+    def lean(self) -> complex:
+        """How it leans for its acceleration: m ahead + 1j m to the left, a metre up.
+
+        Then the force of the ground on the feet goes through what leans.
+        """
+        return complex(self.acceleration_ahead / GRAVITY, self.acceleration_left / GRAVITY)
 
     @property
     def frame(self) -> Footprint:

@@ -10,14 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controller_node.references.steering.course import Course, Footprint
+from controller_node.references.steering.course import GRAVITY, Course, Footprint
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 
 _STANDING = 0.35  # share of the mean speed over the ground, below which a foot stands
 _STRAY = 0.1  # share of a cycle in which a foot may do otherwise than once a cycle
 _NEAR, _FACING = 0.01, 0.05  # m and rad from where it stands at ease, at which a foot is there
-_GRAVITY = 9.81  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -110,9 +109,8 @@ def at_ease(middle: Footprint, course: Course, frequency: float, height: float) 
     `height` m high, as a course's acceleration asks for; and farther out while going aside, so that
     feet do not meet: they are nearest as one comes down, half a cycle after the other one.
     """
-    lean = complex(course.acceleration_ahead, course.acceleration_left) / _GRAVITY
     out = 1j * math.copysign(0.25 * abs(course.left) / frequency, middle.place.imag)
-    return Footprint(middle.place + out - height * lean, middle.heading)
+    return Footprint(middle.place + out - height * course.lean, middle.heading)
 
 
 def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> float:
@@ -124,7 +122,7 @@ def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> flo
     since = cycle.since_touch_down(phase)
     if since >= cycle.duty:
         return 0.0
-    rate, half = math.sqrt(_GRAVITY / height), 0.5 * cycle.duty
+    rate, half = math.sqrt(GRAVITY / height), 0.5 * cycle.duty
     return 1.0 - math.cosh(rate * (since - half) / frequency) / math.cosh(rate * half / frequency)
 
 

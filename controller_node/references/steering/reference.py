@@ -26,7 +26,6 @@ from msgs_config.geometry import rotations
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MAX_WAITING = 1000  # commands
 _LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead
-_GRAVITY = 9.81  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -188,8 +187,7 @@ class SteeredReference:
 
 def _lean(course: Course) -> tuple[FloatArray, float]:
     """The turn xyzw (4,) of the root as it leans, and the cosine of its angle."""
-    ahead = _LEAN_SHARE_AHEAD * course.acceleration_ahead / _GRAVITY
-    left = course.acceleration_left / _GRAVITY
+    ahead, left = _LEAN_SHARE_AHEAD * course.lean.real, course.lean.imag
     upright = 1.0 / math.sqrt(1.0 + ahead * ahead + left * left)
     size = math.sqrt(2.0 * (1.0 + upright))
     turn = np.array((-upright * left, upright * ahead, 0.0, 1.0 + upright))
