@@ -112,12 +112,21 @@ class SteeredReference:
             start=(now, self.course(now)),
             commands=[*before, command],
         )
-        return Steered(reference, command, self._end_of_likeness(command))
+        since = self._end_of_likeness(command)
+        if now >= self._first:
+            reference._take_over(self, now, max(since, now))
+        return Steered(reference, command, since)
 
     def within(self, region: VelocityRegion) -> "SteeredReference":
         """One that has no command yet, and takes them within a region."""
         limits = self.limits.narrowed(region)
         return SteeredReference(self._character, self._gait, limits, rate_hz=self._rate)
+
+    def _take_over(self, other: "SteeredReference", first: int, last: int) -> None:
+        """Remember what another one does, which is the same from one tick to another one."""
+        begin = first - other._first
+        self._first, self._courses = first, other._courses[begin : last + 1 - other._first]
+        self._poses = {tick: pose for tick, pose in other._poses.items() if first <= tick <= last}
 
     def _end_of_likeness(self, command: VelocityCommand) -> int:
         """The first tick at which a command makes a difference."""
