@@ -4,11 +4,17 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+from controller_node.references.steering.velocity import (
+    STOP,
+    SteeringLimits,
+    VelocityCommand,
+    within,
+)
 
 GRAVITY = 9.81  # m/s^2
 _LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
 _SMALL = 1e-6  # rad
+_LOOKS = 3  # steps of a look ahead
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,12 @@ class Footprint:
         """It, where it was said in the frame of another one."""
         place = other.place + self.place * cmath.rect(1.0, other.heading)
         return Footprint(place, self.heading + other.heading)
+
+    def towards(self, other: "Footprint", share: float) -> "Footprint":
+        """Between it and another one, by the shorter turn."""
+        turn = math.remainder(other.heading - self.heading, math.tau)
+        place = self.place + share * (other.place - self.place)
+        return Footprint(place, self.heading + share * turn)
 
 
 @dataclass(frozen=True)
@@ -40,6 +52,7 @@ class Course:
     pace: float = 0.0  # m/s, the speed whose poses are shown
     is_backward: bool = False  # whether the cycle runs backward
     feet: tuple[Footprint, ...] = ()  # in the world
+    targets: tuple[Footprint, ...] = ()  # where they come down next, or came down last
 
     @property
     def is_moving(self) -> bool:
@@ -66,21 +79,30 @@ class Course:
         way = cmath.rect(time * chord, 0.5 * angle) * complex(self.forward, self.left)
         return Footprint(way, angle).moved_by(self.frame)
 
+    def stopping(self, limits: SteeringLimits, time: float) -> "Course":
+        """The course `time` s later, but for what follows from the gait, if it is told to stop."""
+        course = self
+        for _ in range(_LOOKS):
+            course = course.advanced(STOP, limits, time / _LOOKS)
+        return course
+
     def advanced(self, wanted: VelocityCommand, limits: SteeringLimits, period: float) -> "Course":
         """A tick of so many seconds later, but for what follows from the gait."""
         forward = limits.approach(self.forward, wanted.forward, period)
         left = limits.approach(self.left, wanted.left, period)
         turn = self.turn + within(wanted.turn - self.turn, limits.turn_acceleration * period)
-        heading = math.remainder(self.heading + turn * period, math.tau)
-        cosine, sine = math.cos(heading), math.sin(heading)
+        turned = 0.5 * (self.turn + turn) * period
+        middle = self.heading + 0.5 * turned
+        cosine, sine = math.cos(middle), math.sin(middle)
+        mean_forward, mean_left = 0.5 * (self.forward + forward), 0.5 * (self.left + left)
         ahead = (forward - self.forward) / period - turn * left
         leftward = (left - self.left) / period + turn * forward
         share = min(period / _LEAN_TIME_CONSTANT, 1.0)
         return replace(
             self,
-            x=self.x + period * (cosine * forward - sine * left),
-            y=self.y + period * (sine * forward + cosine * left),
-            heading=heading,
+            x=self.x + period * (cosine * mean_forward - sine * mean_left),
+            y=self.y + period * (sine * mean_forward + cosine * mean_left),
+            heading=math.remainder(self.heading + turned, math.tau),
             forward=forward,
             left=left,
             turn=turn,

@@ -3,7 +3,9 @@
 A captured cycle goes straight ahead at its own speed. Elsewhere its feet would slide: in bends, to
 the side, on the spot, at other speeds. So each foot has a footprint of its own. While the cycle has
 the foot on the ground, the print stays; then it swings to where the character, at its present
-velocity, will be at mid-stance. At the cycle's own velocity this is what the cycle does itself.
+velocity, will be at mid-stance. Told to stop, it swings to where the character will be as it
+brakes, or will stand, if that is before the foot would be lifted again. At the cycle's own velocity
+this is what the cycle does itself.
 """
 
 import math
@@ -51,13 +53,10 @@ class FootCycle:
     def towards(self, other: "FootCycle", share: float) -> "FootCycle":
         """Between it and another one."""
         later = math.remainder(other.touch_down - self.touch_down, 1.0)
-        a, b = self.middle, other.middle
         return FootCycle(
             (self.touch_down + share * later) % 1.0,
             self.duty + share * (other.duty - self.duty),
-            Footprint(
-                a.place + share * (b.place - a.place), a.heading + share * (b.heading - a.heading)
-            ),
+            self.middle.towards(other.middle, share),
         )
 
 
@@ -126,30 +125,32 @@ def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> flo
     return 1.0 - math.cosh(rate * (since - half) / frequency) / math.cosh(rate * half / frequency)
 
 
-def stepped(
-    foot: Footprint, cycle: FootCycle, ease: Footprint, before: float, course: Course, rate: float
-) -> Footprint:
-    """A foot's print in the world at a tick, from that of the tick before.
+def time_to_stance(cycle: FootCycle, before: float, course: Course, rate: float) -> float | None:
+    """Time in s to the middle of the stance that the swing of a tick leads to; None if it stands.
 
     Args:
-        foot: The print.
-        cycle: Its cycle.
-        ease: Where it is to be at mid-stance, in the character's own frame.
+        cycle: The foot's.
         before: The phase at the tick before.
         course: The course at the tick, with its phase.
         rate: Cycles a second.
     """
     was, now = (cycle.swung(phase, course.is_backward) for phase in (before, course.phase))
     if was == now or (now == 0.0 and was < 0.5):
-        return foot
-    time = (
-        cycle.to_middle(course.phase, course.is_backward) / rate if now else 0.5 * cycle.duty / rate
-    )
-    target = ease.moved_by(course.after(time))
+        return None
+    return (cycle.to_middle(course.phase, course.is_backward) if now else 0.5 * cycle.duty) / rate
+
+
+def stepped(
+    foot: Footprint, cycle: FootCycle, target: Footprint, before: float, course: Course
+) -> Footprint:
+    """The print in the world of a foot that swings to a target, from that of the tick before.
+
+    `before` is the phase at the tick before, `course` the course at the tick, with its phase.
+    """
+    was, now = (cycle.swung(phase, course.is_backward) for phase in (before, course.phase))
     left = 1.0 - eased(was)
     share = 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
-    turn = math.remainder(target.heading - foot.heading, math.tau)
-    return Footprint(foot.place + share * (target.place - foot.place), foot.heading + share * turn)
+    return foot.towards(target, share)
 
 
 def is_at_ease(foot: Footprint, ease: Footprint, course: Course) -> bool:

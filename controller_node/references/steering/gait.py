@@ -23,6 +23,7 @@ from msgs_config.compiled.rotations import blend_turns
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order, rotations
 
+_SPEEDS = 64  # whose feet are remembered; it asks for some again and again
 _ROWS = 96  # steps of phase in a cycle
 _LEAST_SPEED = 0.05  # m/s
 _MOST_TURN = 0.5  # rad a cycle, at most; the turn is taken out
@@ -136,6 +137,7 @@ class Gait:
         """
         self._cycles, self._size = cycles, (layout.size, len(layout.rotation_entries))
         self._speeds = [cycle.speed for cycle in cycles]
+        self._foot_cycles: dict[float, tuple[FootCycle, ...]] = {}  # of speeds of late
         for slow, fast in zip(self._speeds, self._speeds[1:], strict=False):
             if fast <= slow:
                 raise ConfigurationError(
@@ -184,9 +186,13 @@ class Gait:
 
     def foot_cycles(self, speed: float) -> tuple[FootCycle, ...]:
         """When each foot stands at a speed in m/s; none where one does otherwise than once."""
-        slow, fast, share = self._around(abs(speed))
-        pairs = zip(slow.foot_cycles, fast.foot_cycles, strict=False)
-        return tuple(a.towards(b, share) for a, b in pairs)
+        if speed not in self._foot_cycles:
+            if len(self._foot_cycles) > _SPEEDS:
+                self._foot_cycles.clear()
+            slow, fast, share = self._around(abs(speed))
+            pairs = zip(slow.foot_cycles, fast.foot_cycles, strict=False)
+            self._foot_cycles[speed] = tuple(a.towards(b, share) for a, b in pairs)
+        return self._foot_cycles[speed]
 
 
 def _between(a: GeneralizedPosition, b: GeneralizedPosition, share: float) -> GeneralizedPosition:

@@ -13,6 +13,7 @@ from controller_node.references.steering.gait import Gait
 from controller_node.references.steering.legs import Legs
 from controller_node.references.steering.stepping import Stepping
 from controller_node.references.steering.velocity import (
+    STOP,
     SteeringLimits,
     VelocityCommand,
     VelocityRegion,
@@ -35,9 +36,6 @@ class Steered:
     reference: "SteeredReference"
     command: VelocityCommand  # as it is taken: within the limits
     since: int  # the first tick at which the reference may be another one
-
-
-_STOP = VelocityCommand(0, 0.0)
 
 
 class SteeredReference:
@@ -152,14 +150,15 @@ class SteeredReference:
     def _advanced(self, course: Course, tick: int) -> Course:
         """The course at a tick, from that of the tick before."""
         period = 1.0 / self._rate
-        moved = course.advanced(self._wanted(tick - 1), self.limits, period)
-        return self._stepping.advanced(moved, period)
+        wanted = self._wanted(tick - 1)
+        moved = course.advanced(wanted, self.limits, period)
+        return self._stepping.advanced(moved, wanted, self.limits, period)
 
     def _wanted(self, tick: int) -> VelocityCommand:
         """The command in force at a tick."""
         row = self._row(tick)
         if row < 0 or tick - self._commands[row].tick >= self.limits.timeout * self._rate:
-            return _STOP
+            return STOP
         return self._commands[row]
 
     def _row(self, tick: int) -> int:

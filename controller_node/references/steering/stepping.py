@@ -8,12 +8,13 @@ import numpy as np
 from controller_node.references.steering import footsteps
 from controller_node.references.steering.course import Course, Footprint
 from controller_node.references.steering.gait import Gait
-from controller_node.references.steering.velocity import within
+from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
 _LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are lifted as those
 _EASE = 0.5  # of it: slower steps are as narrow as those
+_AIM_TIME_CONSTANT = 0.1  # s, of a foot's aim that another command changes as it swings
 _PACE_TIME = 0.4  # s in which the pace changes by the slowest captured speed, at least
 
 
@@ -31,38 +32,62 @@ class Stepping:
 
     def standing(self) -> Course:
         """Standing at the origin."""
-        cycles = self._gait.foot_cycles(0.0)
-        return Course(feet=tuple(cycle.middle for cycle in cycles))
+        feet = tuple(cycle.middle for cycle in self._gait.foot_cycles(0.0))
+        return Course(feet=feet, targets=feet)
 
-    def advanced(self, course: Course, period: float) -> Course:
+    def advanced(
+        self, course: Course, wanted: VelocityCommand, limits: SteeringLimits, period: float
+    ) -> Course:
         """A course with the phase, the pace and the feet of its tick; as yet of the tick before."""
         if not course.feet:
             speed = course.forward
             phase = (course.phase + self._gait.frequency(speed) * period) % 1.0
             return replace(course, phase=phase, pace=abs(speed))
-        walk = self._gait.speeds[1]
-        speed = max(abs(complex(course.forward, course.left)), _LEAST_PACE * walk)
-        rate, ease = self._gait.frequency(speed), self._at_ease(course)
+        speed, at_ease = self._speed(course), self._at_ease(course)
         steps = course.is_moving or not all(
             footsteps.is_at_ease(foot, place, course)
-            for foot, place in zip(course.feet, ease, strict=True)
+            for foot, place in zip(course.feet, at_ease, strict=True)
         )
-        most = walk / _PACE_TIME * period
+        most = self._gait.speeds[1] / _PACE_TIME * period
         pace = course.pace + within((speed if steps else 0.0) - course.pace, most)
         if not steps:
             return replace(course, pace=pace)
-        cycles = self._gait.foot_cycles(pace)
+        rate, cycles = self._gait.frequency(speed), self._gait.foot_cycles(pace)
         backward = course.is_backward
         if course.forward and not any(cycle.swung(course.phase, backward) for cycle in cycles):
             backward = course.forward < 0.0
         by = -rate * period if backward else rate * period
         phase = (course.phase + by) % 1.0
         there = replace(course, pace=pace, phase=phase, is_backward=backward)
-        feet = (
-            footsteps.stepped(*each, course.phase, there, rate)
-            for each in zip(course.feet, cycles, ease, strict=True)
-        )
-        return replace(there, feet=tuple(feet))
+        feet, targets = list(course.feet), list(course.targets)
+        for row, (foot, cycle) in enumerate(zip(course.feet, cycles, strict=True)):
+            time = footsteps.time_to_stance(cycle, course.phase, there, rate)
+            if time is None:
+                continue
+            target = at_ease[row].moved_by(there.after(time))
+            if wanted.is_stop:
+                stance = self._stance(row, there.stopping(limits, time), limits)
+                target = self._at_ease(stance)[row].moved_by(stance.frame)
+            if cycle.swung(course.phase, backward):
+                target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
+            targets[row] = target
+            feet[row] = footsteps.stepped(foot, cycle, target, course.phase, there)
+        return replace(there, feet=tuple(feet), targets=tuple(targets))
+
+    def _speed(self, course: Course) -> float:
+        """The speed in m/s, as fast as whose cycle it steps."""
+        least = _LEAST_PACE * self._gait.speeds[1]
+        return max(abs(complex(course.forward, course.left)), least)
+
+    def _stance(self, foot: int, middle: Course, limits: SteeringLimits) -> Course:
+        """The course that a foot is put down for, as it stops: at mid-stance, or as it stands.
+
+        The latter if it will have stopped before the foot would be lifted again.
+        """
+        speed = self._speed(middle)
+        left = 0.5 * self._gait.foot_cycles(speed)[foot].duty / self._gait.frequency(speed)
+        to_stop = limits.time_to_stop(middle.forward, middle.left, middle.turn)
+        return middle.stopping(limits, left) if to_stop < left else middle
 
     def on_prints(self, feet: GeneralizedPosition, course: Course) -> GeneralizedPosition:
         """The gait's feet, places (3f,) in m and orientations (f, 4), carried to their prints."""

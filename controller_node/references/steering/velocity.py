@@ -17,9 +17,17 @@ class VelocityCommand:
     left: float = 0.0  # m/s
     turn: float = 0.0  # rad/s, to the left
 
+    @property
+    def is_stop(self) -> bool:
+        """Whether it is to stand."""
+        return self.forward == self.left == self.turn == 0.0
+
     def is_like(self, other: "VelocityCommand") -> bool:
         """Whether another one asks for the same, whenever."""
         return replace(self, tick=other.tick) == other
+
+
+STOP = VelocityCommand(0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,11 @@ class SteeringLimits(Settings, prefix="steering."):
         slows = abs(wanted) < abs(speed) or wanted * speed < 0.0
         most = self.braking if slows else self.acceleration
         return speed + within(wanted - speed, most * period)
+
+    def time_to_stop(self, forward: float, left: float, turn: float) -> float:
+        """Time in s until it stands, of velocities in m/s and rad/s, once it is told to."""
+        fastest = max(abs(forward), abs(left))
+        return max(fastest / self.braking, abs(turn) / self.turn_acceleration)
 
 
 def within(value: float, most: float) -> float:
