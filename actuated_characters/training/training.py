@@ -17,7 +17,7 @@ from controller_node.planner.policy.file import Policy, write_policy
 from msgs_config.arrays import FloatArray
 
 _WORLDS, _DECISIONS = 64, 48  # of a trace
-_SPREADS = (0.35, 0.12)  # standard deviation of what is tried, at first and in the end
+_SPREADS = (1.0, 0.3)  # standard deviation of what is tried, at first and in the end
 _RATES = (1.2e-3, 2e-4)  # of a policy's steps, at first and in the end
 _FROM = 0.5  # of that course, from where on it goes where it begins with what another policy can
 _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
