@@ -186,13 +186,15 @@ class Gait:
 
     def foot_cycles(self, speed: float) -> tuple[FootCycle, ...]:
         """When each foot stands at a speed in m/s; none where one does otherwise than once."""
-        if speed not in self._foot_cycles:
+        found = self._foot_cycles.get(speed)
+        if found is None:
             if len(self._foot_cycles) > _SPEEDS:
                 self._foot_cycles.clear()
             slow, fast, share = self._around(abs(speed))
             pairs = zip(slow.foot_cycles, fast.foot_cycles, strict=False)
-            self._foot_cycles[speed] = tuple(a.towards(b, share) for a, b in pairs)
-        return self._foot_cycles[speed]
+            found = tuple(a.towards(b, share) for a, b in pairs)
+            self._foot_cycles[speed] = found
+        return found
 
 
 def _between(a: GeneralizedPosition, b: GeneralizedPosition, share: float) -> GeneralizedPosition:
