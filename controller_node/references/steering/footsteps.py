@@ -125,32 +125,13 @@ def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> flo
     return 1.0 - math.cosh(rate * (since - half) / frequency) / math.cosh(rate * half / frequency)
 
 
-def time_to_stance(cycle: FootCycle, before: float, course: Course, rate: float) -> float | None:
-    """Time in s to the middle of the stance that the swing of a tick leads to; None if it stands.
+def swing_share(was: float, now: float) -> float:
+    """The share of the way that is left which a foot goes in a tick, of what of its swing is done.
 
-    Args:
-        cycle: The foot's.
-        before: The phase at the tick before.
-        course: The course at the tick, with its phase.
-        rate: Cycles a second.
+    Both are from 0 to 1; `now` is 0 once it has come down.
     """
-    was, now = (cycle.swung(phase, course.is_backward) for phase in (before, course.phase))
-    if was == now or (now == 0.0 and was < 0.5):
-        return None
-    return (cycle.to_middle(course.phase, course.is_backward) if now else 0.5 * cycle.duty) / rate
-
-
-def stepped(
-    foot: Footprint, cycle: FootCycle, target: Footprint, before: float, course: Course
-) -> Footprint:
-    """The print in the world of a foot that swings to a target, from that of the tick before.
-
-    `before` is the phase at the tick before, `course` the course at the tick, with its phase.
-    """
-    was, now = (cycle.swung(phase, course.is_backward) for phase in (before, course.phase))
     left = 1.0 - eased(was)
-    share = 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
-    return foot.towards(target, share)
+    return 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
 
 
 def is_at_ease(foot: Footprint, ease: Footprint, course: Course) -> bool:

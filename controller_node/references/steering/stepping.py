@@ -8,7 +8,12 @@ import numpy as np
 from controller_node.references.steering import footsteps
 from controller_node.references.steering.course import Course, Footprint
 from controller_node.references.steering.gait import Gait
-from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
+from controller_node.references.steering.velocity import (
+    STOP,
+    SteeringLimits,
+    VelocityCommand,
+    within,
+)
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
@@ -61,17 +66,18 @@ class Stepping:
         there = replace(course, pace=pace, phase=phase, is_backward=backward)
         feet, targets = list(course.feet), list(course.targets)
         for row, (foot, cycle) in enumerate(zip(course.feet, cycles, strict=True)):
-            time = footsteps.time_to_stance(cycle, course.phase, there, rate)
-            if time is None:
-                continue
-            target = at_ease[row].moved_by(there.after(time))
-            if wanted.is_stop:
-                stance = self._stance(row, there.stopping(limits, time), limits)
-                target = self._at_ease(stance)[row].moved_by(stance.frame)
-            if cycle.swung(course.phase, backward):
+            was, now = (cycle.swung(each, backward) for each in (course.phase, phase))
+            if was == now or (now == 0.0 and was < 0.5):
+                continue  # it stands
+            time = (cycle.to_middle(phase, backward) if now else 0.5 * cycle.duty) / rate
+            if wanted.is_like(STOP):
+                target = self._where_it_stops(row, there, limits, time)
+            else:
+                target = at_ease[row].moved_by(there.after(time))
+            if was:
                 target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
             targets[row] = target
-            feet[row] = footsteps.stepped(foot, cycle, target, course.phase, there)
+            feet[row] = foot.towards(target, footsteps.swing_share(was, now))
         return replace(there, feet=tuple(feet), targets=tuple(targets))
 
     def _speed(self, course: Course) -> float:
@@ -79,15 +85,19 @@ class Stepping:
         least = _LEAST_PACE * self._gait.speeds[1]
         return max(abs(complex(course.forward, course.left)), least)
 
-    def _stance(self, foot: int, middle: Course, limits: SteeringLimits) -> Course:
-        """The course that a foot is put down for, as it stops: at mid-stance, or as it stands.
+    def _where_it_stops(
+        self, foot: int, course: Course, limits: SteeringLimits, time: float
+    ) -> Footprint:
+        """Where a foot comes down as the character stops, for a mid-stance `time` s from now.
 
-        The latter if it will have stopped before the foot would be lifted again.
+        If it will have stopped before the foot would be lifted again, it is where the foot stays.
         """
-        speed = self._speed(middle)
+        stance = course.stopping(limits, time)
+        speed = self._speed(stance)
         left = 0.5 * self._gait.foot_cycles(speed)[foot].duty / self._gait.frequency(speed)
-        to_stop = limits.time_to_stop(middle.forward, middle.left, middle.turn)
-        return middle.stopping(limits, left) if to_stop < left else middle
+        if limits.time_to_stop(stance.forward, stance.left, stance.turn) < left:
+            stance = stance.stopping(limits, left)
+        return self._at_ease(stance)[foot].moved_by(stance.frame)
 
     def on_prints(self, feet: GeneralizedPosition, course: Course) -> GeneralizedPosition:
         """The gait's feet, places (3f,) in m and orientations (f, 4), carried to their prints."""

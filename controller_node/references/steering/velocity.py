@@ -17,11 +17,6 @@ class VelocityCommand:
     left: float = 0.0  # m/s
     turn: float = 0.0  # rad/s, to the left
 
-    @property
-    def is_stop(self) -> bool:
-        """Whether it is to stand."""
-        return self.forward == self.left == self.turn == 0.0
-
     def is_like(self, other: "VelocityCommand") -> bool:
         """Whether another one asks for the same, whenever."""
         return replace(self, tick=other.tick) == other
