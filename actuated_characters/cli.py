@@ -35,8 +35,8 @@ _RUN = "run"  # this command alone prints the overview
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     open_missing_streams()
-    raise_at_signals()
     try:
+        raise_at_signals()  # within, for a signal that waits is raised at once
         parser = _parser()
         complete(parser)
         given = sys.argv[1:] if arguments is None else list(arguments)

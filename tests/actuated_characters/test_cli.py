@@ -38,6 +38,24 @@ def test_the_command_has_numpy_on_one_thread() -> None:
     assert done.stdout.strip() == "1", done.stdout
 
 
+def test_a_signal_that_comes_as_the_command_begins_ends_it_without_a_traceback() -> None:
+    script = """if True:
+        import signal, sys
+        from actuated_characters.cli import main
+        handle = signal.signal
+
+        def handle_one_that_waits(number, handler):
+            handle(number, handler)
+            signal.raise_signal(number)
+
+        signal.signal = handle_one_that_waits
+        sys.exit(main(["--version"]))"""
+
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
 def test_piped_parameters_have_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--parameters", "controller_node", "--character", "pendulum"]) == 0
 
