@@ -31,6 +31,15 @@ _FALL_COSTS = 1.0  # reward, of one fall a second
 
 
 @dataclass(frozen=True)
+class Look:
+    """How good a policy is, without what is tried."""
+
+    seconds: float  # of all worlds together
+    falls: int  # in them, half of them pushed where it learns to take pushes
+    is_better: bool  # than all before, and is kept
+
+
+@dataclass(frozen=True)
 class Progress:
     """How far a training is, and what its worlds, with all that is tried and pushed, are like."""
 
@@ -39,7 +48,7 @@ class Progress:
     off_m: float  # median of the centre of mass
     off_rad: float  # median of a joint
     push: float  # N s, up to which pushes are
-    is_better: bool  # whether there is a better policy than before
+    look: Look | None  # now and then
 
 
 Kept: TypeAlias = tuple[Network, Network, Mapping[str, object], float]
@@ -122,8 +131,8 @@ class Training:
         self._done += trace.rewards.size
         self._lead_pushes(trace)
         is_due = self._done * _LOOKS >= (self._looked + 1) * self._job.decisions
-        is_better = (is_due or self.is_over) and self._look()
-        return self._progress(trace, push, is_better)
+        look = self._look() if is_due or self.is_over else None
+        return self._progress(trace, push, look)
 
     def save(self, path: Path, figures: Mapping[str, object]) -> None:
         """Write the best policy so far, with the figures that it was accepted with."""
@@ -164,8 +173,8 @@ class Training:
         by = _GROWS if self._falls < _RARE else -_SHRINKS if self._falls > _OFTEN else 0.0
         self._push = float(np.clip(self._push + by, _LEAST_PUSH, max(self._job.most_push, 0.0)))
 
-    def _look(self) -> bool:
-        """Keep the policy if it is the best so far, in episodes as it would be used; if it is."""
+    def _look(self) -> Look:
+        """Keep the policy if it is the best so far, in episodes as it would be used."""
         self._looked = self._done * _LOOKS // self._job.decisions
         traces = [self._exam(push) for push in sorted({0.0, _EXAM_PUSH * self._job.most_push})]
         score = sum(map(self._score, traces))
@@ -173,7 +182,8 @@ class Training:
         if is_better:
             calm = self._learner.least_expected(traces[0])
             self._best, self._kept = score, self._current(calm)
-        return is_better
+        falls = sum(int((each.ends == FELL).sum()) for each in traces)
+        return Look(len(traces) * _LOOK_WORLDS * _LOOK_S, falls, is_better)
 
     def _exam(self, most_push: float) -> Trace:
         """Episodes that are the same each time but for what the policy does."""
@@ -204,7 +214,7 @@ class Training:
         )
         return policy, value, trained, calm
 
-    def _progress(self, trace: Trace, push: float, is_better: bool) -> Progress:
+    def _progress(self, trace: Trace, push: float, look: Look | None) -> Progress:
         ended = trace.lengths[(trace.ends == FELL) | (trace.ends == CUT)]
         self._lengths = (self._lengths + ended.tolist())[-4 * _WORLDS :]
         lasted = float(np.mean(self._lengths)) if self._lengths else 0.0
@@ -218,5 +228,5 @@ class Training:
             float(np.median(places)),
             float(np.median(turns.mean(axis=-1))),
             push,
-            is_better,
+            look,
         )

@@ -10,7 +10,7 @@ from actuated_characters.commands.common.progress import progress_bar, say
 from actuated_characters.commands.common.settings import Commands, add_character, add_command
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.training.training import Progress, Training
+    from actuated_characters.training.training import Look, Progress, Training
 
 DECISIONS_A_MINUTE = 500_000  # on two processors
 FOLDER, SUFFIX = Path("policies"), ".npz"
@@ -142,10 +142,12 @@ def _go_on(training: "Training", title: str, decisions: int, output: Path) -> fl
             while not training.is_over:
                 progress = training.go_on()
                 bar.update(bar.task_ids[0], completed=progress.decisions, state=_words(progress))
-                if progress.is_better:
+                look = progress.look
+                if look and look.is_better:
                     training.save(output, {})
-                    if not bar.console.is_terminal:  # there the bar shows nothing until the end
-                        say(f"{progress.decisions:,} of {decisions:,}: {_words(progress)}")
+                if look and not bar.console.is_terminal:  # the bar shows nothing until the end
+                    words = f"{_words(progress)}; {_verdict(look)}"
+                    say(f"{progress.decisions:,} of {decisions:,}: {words}")
     except KeyboardInterrupt as interrupted:
         if not training.has_best:
             raise  # so soon there is nothing better than what FILE may have
@@ -162,3 +164,8 @@ def _words(progress: "Progress") -> str:
         f"lasts {progress.survived_s:.1f} s, pushes {progress.push:.0f} N s, "
         f"off {progress.off_m:.2f} m {progress.off_rad:.2f} rad"
     )
+
+
+def _verdict(look: "Look") -> str:
+    kept = "best so far" if look.is_better else "not kept"
+    return f"by itself {look.falls} falls in {look.seconds:.0f} s: {kept}"

@@ -243,6 +243,21 @@ def test_an_interruption_keeps_the_best(
     assert "play it:" in said.out
 
 
+def test_it_says_each_look_also_where_it_keeps_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_small(monkeypatch, _LOOKS=10_000)
+    interrupted_at(monkeypatch, 4, signal.SIGTERM)
+    scores = iter((0.2, 0.1, 0.5))
+    monkeypatch.setattr(Training, "_score", lambda *ignored: next(scores))
+
+    with pytest.raises(Interrupted):
+        main(["train", "--pushes", "0", "--output", "walk.npz"])
+
+    looks = [line for line in capsys.readouterr().err.splitlines() if " falls in " in line]
+    assert [line.rsplit(": ", 1)[1] for line in looks] == ["best so far", "not kept", "best so far"]
+
+
 def test_who_ends_it_for_good_has_the_best_without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     make_small(monkeypatch, _LOOKS=10_000)
     interrupted_at(monkeypatch, 3, signal.SIGTERM)

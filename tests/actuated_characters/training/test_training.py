@@ -14,7 +14,7 @@ from actuated_characters.training import training as module
 from actuated_characters.training.episode_types import FELL, Trace
 from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.job import Job, check_resumed, check_start, make_job
-from actuated_characters.training.training import Training
+from actuated_characters.training.training import Look, Training
 from controller_node.planner.policy.file import Policy, read_policy, shipped_policies
 from msgs_config.arrays import SingleArray
 from msgs_config.errors import ConfigurationError
@@ -253,7 +253,7 @@ def test_the_best_is_kept_rather_than_the_last(
     monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
     for number in range(3):
         training._learner.policy.bias_3[:] = number
-        bests.append(training._look())
+        bests.append(training._look().is_better)
 
     assert bests == [True, True, False]
     assert (training.best({}).network.bias_3 == 1.0).all()
@@ -267,7 +267,7 @@ def test_a_file_says_what_its_own_policy_was_trained_with(
     training.go_on()
     training._look()
     kept = training.best({})
-    monkeypatch.setattr(training, "_look", lambda: False)
+    monkeypatch.setattr(training, "_look", lambda: Look(10.0, 0, is_better=False))
 
     training.go_on()
 
@@ -291,7 +291,9 @@ def test_a_policy_that_falls_is_worse_than_one_that_costs_a_little_more(
     monkeypatch.setattr(training._judges, "run", run)
     monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
 
-    assert [training._look(), training._look()] == [True, False]
+    looks = [training._look(), training._look()]
+
+    assert [(each.falls, each.is_better) for each in looks] == [(0, True), (1, False)]
 
 
 def test_episodes_begin_more_often_where_others_fell(
@@ -319,7 +321,7 @@ def test_it_looks_as_often_as_it_should(begin: Callable[..., Training]) -> None:
     training, looks = begin(job), []
     look = training._look
 
-    def count() -> bool:
+    def count() -> Look:
         looks.append(training.done // DECISIONS)
         return look()
 
