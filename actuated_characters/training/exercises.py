@@ -16,11 +16,11 @@ from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import ClipFrames, read_clip
 
-_DRIVEN_S = 480.0  # of a drive in which episodes begin
+_DRIVEN_S = 960.0  # of a drive in which episodes begin
 _TRIED_S = 60.0  # of the last runs of what does not end
 _STEADY = 1.0  # m/s
 _MOOD_S = (1.0, 4.0)  # least and most time for which a driver wants the same
-_STOPS, _MANOEUVRES, _BENDS = 0.15, 0.35, 0.5  # shares of moods; of what goes ahead, of bends
+_STOPS, _MANOEUVRES, _BENDS = 0.2, 0.35, 0.5  # shares of moods; of what goes ahead, of bends
 _SHARPEST = 1.5  # m/s^2 to the side, that a driver wants
 _SHORTEST = 0.1  # s, that a mood lasts at the end
 _DIGITS = 1e3  # a velocity's and a time's, rounded to zero, so that none is beyond its limit
@@ -92,16 +92,19 @@ class Exercise:
 
 
 def random_drive(limits: SteeringLimits, seconds: float, seed: int) -> str:
-    """Velocities as `--cmd-vel` takes them: ahead at any speed, bends, and stops.
+    """Velocities as `--cmd-vel` takes them: ahead at any speed, bends, stops, but no two in a row.
 
     And manoeuvres: slowly ahead or back, aside, and turning, each of these or not.
     """
     rng, time, drive = np.random.default_rng((seed, 7)), 0.0, list[str]()
+    velocity = (0.0, 0.0, 0.0)
     ahead = min(limits.region.ahead, limits.speed)
     back, aside = (min(each, limits.speed) for each in (limits.region.back, limits.region.aside))
     turn = min(limits.turn_rate, limits.region.turn)
     while time == 0.0 or time < seconds - _SHORTEST:
-        mood, velocity = rng.random(), (0.0, 0.0, 0.0)
+        mood, stood, velocity = rng.random(), not any(velocity), (0.0, 0.0, 0.0)
+        if stood:
+            mood = _STOPS + (1.0 - _STOPS) * mood
         if mood > 1.0 - _MANOEUVRES:
             parts = rng.uniform(-1.0, 1.0, 3) * rng.integers(0, 2, 3)
             velocity = back * parts[0], aside * parts[1], turn * parts[2]

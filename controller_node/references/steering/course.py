@@ -4,16 +4,10 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 
-from controller_node.references.steering.velocity import (
-    STOP,
-    SteeringLimits,
-    VelocityCommand,
-    within,
-)
+from controller_node.references.steering.velocity import SteeringLimits, VelocityCommand, within
 
 GRAVITY = 9.81  # m/s^2
 _LEAN_TIME_CONSTANT = 0.15  # s, time constant of the lean
-_SMALL = 1e-6  # rad
 _LOOKS = 3  # steps of a look ahead
 
 
@@ -72,18 +66,11 @@ class Course:
         """The character's own frame on the ground."""
         return Footprint(complex(self.x, self.y), self.heading)
 
-    def after(self, time: float) -> Footprint:
-        """The own frame `time` s later, if it goes on at these velocities: along an arc."""
-        angle = self.turn * time
-        chord = 1.0 if abs(angle) < _SMALL else math.sin(0.5 * angle) / (0.5 * angle)
-        way = cmath.rect(time * chord, 0.5 * angle) * complex(self.forward, self.left)
-        return Footprint(way, angle).moved_by(self.frame)
-
-    def stopping(self, limits: SteeringLimits, time: float) -> "Course":
-        """The course `time` s later, but for what follows from the gait, if it is told to stop."""
+    def following(self, wanted: VelocityCommand, limits: SteeringLimits, time: float) -> "Course":
+        """The course `time` s later, but for what follows from the gait, if a command stays."""
         course = self
         for _ in range(_LOOKS):
-            course = course.advanced(STOP, limits, time / _LOOKS)
+            course = course.advanced(wanted, limits, time / _LOOKS)
         return course
 
     def advanced(self, wanted: VelocityCommand, limits: SteeringLimits, period: float) -> "Course":

@@ -70,10 +70,7 @@ class Stepping:
             if was == now or (now == 0.0 and was < 0.5):
                 continue  # it stands
             time = (cycle.to_middle(phase, backward) if now else 0.5 * cycle.duty) / rate
-            if wanted.is_like(STOP):
-                target = self._where_it_stops(row, there, limits, time)
-            else:
-                target = at_ease[row].moved_by(there.after(time))
+            target = self._where_it_stands(row, there, wanted, limits, time)
             if was:
                 target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
             targets[row] = target
@@ -85,18 +82,25 @@ class Stepping:
         least = _LEAST_PACE * self._gait.speeds[1]
         return max(abs(complex(course.forward, course.left)), least)
 
-    def _where_it_stops(
-        self, foot: int, course: Course, limits: SteeringLimits, time: float
+    def _where_it_stands(
+        self,
+        foot: int,
+        course: Course,
+        wanted: VelocityCommand,
+        limits: SteeringLimits,
+        time: float,
     ) -> Footprint:
-        """Where a foot comes down as the character stops, for a mid-stance `time` s from now.
+        """Where a foot comes down, if the command stays, for a mid-stance `time` s from now.
 
-        If it will have stopped before the foot would be lifted again, it is where the foot stays.
+        If the character will have stopped before the foot would be lifted again, it is where the
+        foot stays.
         """
-        stance = course.stopping(limits, time)
-        speed = self._speed(stance)
-        left = 0.5 * self._gait.foot_cycles(speed)[foot].duty / self._gait.frequency(speed)
-        if limits.time_to_stop(stance.forward, stance.left, stance.turn) < left:
-            stance = stance.stopping(limits, left)
+        stance = course.following(wanted, limits, time)
+        if wanted.is_like(STOP):
+            speed = self._speed(stance)
+            left = 0.5 * self._gait.foot_cycles(speed)[foot].duty / self._gait.frequency(speed)
+            if limits.time_to_stop(stance.forward, stance.left, stance.turn) < left:
+                stance = stance.following(STOP, limits, left)
         return self._at_ease(stance)[foot].moved_by(stance.frame)
 
     def on_prints(self, feet: GeneralizedPosition, course: Course) -> GeneralizedPosition:

@@ -8,6 +8,7 @@ import pytest
 
 from controller_node.references.clip import ClipReference
 from controller_node.references.steering.reference import SteeredReference
+from controller_node.references.steering.stepping import Stepping
 from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -151,6 +152,34 @@ def test_a_foot_comes_down_in_front_as_far_as_the_character_goes_in_half_a_stanc
                 assert ahead == pytest.approx(expected, abs=0.01)
                 landed += 1
     assert landed >= 3
+
+
+@pytest.mark.parametrize(
+    ("first", "then"),
+    [
+        pytest.param((2.0, 0.0, 0.0), (0.6, 0.0, 0.0), id="slower"),
+        pytest.param((1.0, 0.0, 0.8), (1.0, 0.0, -0.8), id="the other bend"),
+        pytest.param((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), id="turning"),
+        pytest.param((0.8, 0.0, 0.0), (1.2, 0.0, 0.0), id="faster"),
+    ],
+)
+def test_a_foot_comes_down_where_a_command_will_have_it_amid_its_stance(
+    first: tuple[float, float, float], then: tuple[float, float, float]
+) -> None:
+    reference = steer(driven(*first), VelocityCommand(4 * RATE, *then))
+    landed = 0
+
+    for tick in range(4 * RATE + RATE // 2, 6 * RATE):
+        before, after = stands(reference, tick), stands(reference, tick + 1)
+        for foot in np.flatnonzero(np.greater(after, before)).tolist():
+            lifted = next(t for t in range(tick + 1, 8 * RATE) if not stands(reference, t)[foot])
+            amid = reference.course((tick + 1 + lifted) // 2)
+            at_ease = Stepping(reference._gait)._at_ease(amid)[foot].moved_by(amid.frame)
+            stays = reference.course(tick + 1).feet[foot]
+            assert abs(stays.place - at_ease.place) < 0.015
+            assert stays.heading == pytest.approx(at_ease.heading, abs=0.02)
+            landed += 1
+    assert landed >= 2
 
 
 def test_no_joint_jerks_where_a_drive_changes() -> None:
