@@ -24,8 +24,8 @@ from msgs_config.character.model import Character
 if TYPE_CHECKING:
     from controller_node.planner.commands_in_flight import CommandsInFlight
 
-_TOO_LITTLE = 0.7  # of what it expects while it is calm; from there on it plans
-_ENOUGH = 0.9  # of the same; above it the policy may go on
+_TOO_LITTLE = 0.6  # of what it expects while it is calm; from there on it plans
+_ENOUGH = 0.7  # of the same; above it the policy may go on
 _CALM_S = 0.4  # s for which it must have been so
 
 
@@ -104,15 +104,14 @@ class HybridPlanner:
             self._hand_to_plans(np.zeros(len(seen.state.velocity)))
         if not self.plans:
             offset = self._policy.offset(*given)
-            if not (is_due and self._is_pushed(tick)):
+            if not (is_due and self._is_pushed()):
                 return offset
             self._hand_to_plans(offset)
         return self._predictive.offset(*given)
 
-    def _is_pushed(self, tick: int) -> bool:
+    def _is_pushed(self) -> bool:
         """Whether the policy expects too little of its last decision's state."""
-        least = _TOO_LITTLE * self._policy.policy.calm
-        return self._policy.expected < least or self._is_perturbed(tick)
+        return self._policy.expected < _TOO_LITTLE * self._policy.policy.calm
 
     def _is_calm(self, seen: TickState, gains: GainArrays, desired_at: DesiredAt) -> bool:
         """Whether a policy has expected enough of states for a while, after another one."""

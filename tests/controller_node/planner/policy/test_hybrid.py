@@ -202,7 +202,7 @@ def pushed(impulse: float, planner: str) -> Iterator[Tick]:
 def test_it_bears_a_push_that_fells_the_policy() -> None:
     heights = {}
     for planner in ("policy", "hybrid"):
-        heights[planner] = [tick.following.position[2] for tick in pushed(40.0, planner)]
+        heights[planner] = [tick.following.position[2] for tick in pushed(80.0, planner)]
 
     assert min(heights["policy"]) < 0.5
     assert min(heights["hybrid"]) > 0.6
