@@ -97,7 +97,7 @@ def test_a_steered_run_goes_where_the_drive_says() -> None:
     [
         ("walk", 1.27, 60.0, ["--clip", "walk"]),
         ("kick", 1.533, 1.533, ["--clip", "kick"]),
-        ("steered", 480.0, 60.0, ["--cmd-vel", "1,0,0@0"]),
+        ("steered", 960.0, 60.0, ["--cmd-vel", "1,0,0@0"]),
     ],
 )
 def test_how_long_it_is_and_how_it_is_played(
