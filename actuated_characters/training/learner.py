@@ -2,7 +2,8 @@
 
 Sources: Schulman et al. 2017, "Proximal Policy Optimization Algorithms"; Schulman et al. 2016,
 "High-Dimensional Continuous Control Using Generalized Advantage Estimation"; Kingma and Ba 2015,
-"Adam: A Method for Stochastic Optimization".
+"Adam: A Method for Stochastic Optimization"; Polyak and Juditsky 1992, "Acceleration of Stochastic
+Approximation by Averaging".
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from msgs_config.arrays import FloatArray, IntArray, SingleArray
 _LARGEST_GRADIENT = 1.0  # norm to which a gradient is shortened
 _MEAN_KEEPS, _SQUARE_KEEPS, _LEAST_ROOT = 0.9, 0.999, 1e-8  # Adam's
 _LOG_RATIO_MOST = 20.0
+_AVERAGED = 100  # traces, over which networks are averaged
 _VALUE_RATE = 1e-3
 _VALUE_WEIGHT = 4.0
 _LEAST_CALM = 1e-3
@@ -59,6 +61,26 @@ class Adam:
             square += np.float32(1.0 - _SQUARE_KEEPS) * (scaled * scaled - square)
             root = np.sqrt(square / np.float32(of_square)) + np.float32(_LEAST_ROOT)
             weights -= np.float32(rate / of_mean) * mean / root
+
+
+class Average:
+    """The mean of what a network was lately, which scatters less than what it is."""
+
+    def __init__(self, network: Network) -> None:
+        """Begin with what it is."""
+        self.network = copy_of(network)
+        self._count = 1
+
+    def take(self, network: Network) -> None:
+        """Count what it is now."""
+        self._count = min(self._count + 1, _AVERAGED)
+        for mean, weights in zip(self.network, network, strict=True):
+            mean += np.float32(1.0 / self._count) * (weights - mean)
+
+
+def copy_of(network: Network) -> Network:
+    """The same weights, of its own."""
+    return Network(*(each.copy() for each in network))
 
 
 def make_network(sizes: Sequence[int], last: float, rng: np.random.Generator) -> Network:
@@ -116,6 +138,7 @@ class Learner:
         self.policy = make_network((inputs, hidden, hidden, actions), 0.01, rng)
         self.value = make_network((inputs, hidden // 2, hidden // 2, 1), 0.1, rng)
         self._policy_steps, self._value_steps = Adam(self.policy), Adam(self.value)
+        self._averages = Average(self.policy), Average(self.value)
         self._threads = ThreadPoolExecutor(1)
 
     def take(self, policy: Network, value: Network) -> None:
@@ -123,6 +146,13 @@ class Learner:
         for own, given in ((self.policy, policy), (self.value, value)):
             for weights, wanted in zip(own, given, strict=True):
                 weights[:] = wanted
+        self._averages = Average(self.policy), Average(self.value)
+
+    @property
+    def averages(self) -> tuple[Network, Network]:
+        """Policy and value as they were lately, which is how they are to be used."""
+        policy, value = self._averages
+        return policy.network, value.network
 
     def close(self) -> None:
         """End its thread."""
@@ -138,17 +168,19 @@ class Learner:
         valuing = self._threads.submit(self._learn_value, lesson, orders)
         self._learn_policy(lesson, orders, np.float32(1.0 / spread), rate)
         valuing.result()
+        for average, network in zip(self._averages, (self.policy, self.value), strict=True):
+            average.take(network)
 
     def _lesson(self, trace: Trace, noise: SingleArray) -> Lesson:
         settings = self._settings
         worlds, decisions = trace.rewards.shape
         whole = 1.0 / (1.0 - settings.discount)  # of a reward of one, for good
-        values = whole * self._values(trace.observations).reshape(worlds, decisions)
+        values = whole * _answers(self.value, trace.observations).reshape(worlds, decisions)
         after = np.empty_like(values)
         after[:, :-1] = values[:, 1:]
         ends = trace.ends != 0
         ends[:, -1] = True
-        after[ends] = whole * self._values(trace.after[ends])
+        after[ends] = whole * _answers(self.value, trace.after[ends])
         after[trace.ends == FELL] = 0.0  # whatever it is told: a state that diverged may be NaN
         surprise = trace.rewards + settings.discount * after - values
         goes_on = settings.discount * settings.fade * (trace.ends == 0)
@@ -166,7 +198,7 @@ class Learner:
         )
 
     def least_expected(self, trace: Trace) -> float:
-        """What is expected in the states of a trace (worlds, decisions) but for a twentieth.
+        """What the averaged value expects in the states of a trace but for a twentieth.
 
         States that lead to a fall within `_FALLS_SOON`, or may, as the trace is over before, do not
         count, if there are others.
@@ -176,14 +208,10 @@ class Learner:
             ends = trace.ends[:, decision]
             left = np.where(ends == FELL, 0, np.where(ends == CUT, _FALLS_SOON, left + 1))
             until_fall[:, decision] = left
-        expected, stays = self._values(trace.observations), until_fall.ravel() >= _FALLS_SOON
+        expected = _answers(self._averages[1].network, trace.observations)
+        stays = until_fall.ravel() >= _FALLS_SOON
         least = float(np.quantile(expected[stays] if stays.any() else expected, 0.05))
         return max(least, _LEAST_CALM)
-
-    def _values(self, observations: SingleArray) -> FloatArray:
-        rows = observations.reshape(-1, observations.shape[-1])
-        found: FloatArray = forward(self.value, rows)[0][:, 0].astype(float)
-        return found
 
     def _parts(self, orders: Sequence[IntArray]) -> list[IntArray]:
         count = max(1, len(orders[0]) // self._settings.part)
@@ -221,3 +249,10 @@ class Learner:
         slope += _OVER_WEIGHT / np.float32(len(part)) * np.maximum(over, 0.0) * np.sign(means)
         single: SingleArray = slope.astype(np.float32)
         return single
+
+
+def _answers(value: Network, observations: SingleArray) -> FloatArray:
+    """What a value (of one output) expects of each observation (..., o)."""
+    rows = observations.reshape(-1, observations.shape[-1])
+    found: FloatArray = forward(value, rows)[0][:, 0].astype(float)
+    return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuated_characters.training.episode_types import CUT, FELL, Trace
 from actuated_characters.training.job import HIDDEN, Job, decisions_of
-from actuated_characters.training.learner import Learner, LearningSettings
+from actuated_characters.training.learner import Learner, LearningSettings, copy_of
 from actuated_characters.training.references import make_scales, make_table
 from actuated_characters.training.worlds import LARGEST_ACTION, TrainingWorlds
 from controller_node.planner.compiled.network import Network
@@ -25,7 +25,8 @@ _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above wh
 _GROWS, _SHRINKS = 0.15, 0.1  # N s a trace
 _LATELY = 0.05  # share of a trace in the mean of falls
 _LOOKS = 20  # at how good a policy is, in a training
-_LOOK_WORLDS, _LOOK_S = 16, 10.0
+_LOOKS_TAKE = 0.05  # decisions of all looks, against those of the training
+_LOOK_WORLDS, _LOOK_S = 16, 10.0  # least worlds
 _EXAM_PUSH = 0.5  # of the hardest push, in half of a look
 _FALL_COSTS = 1.0  # reward, of one fall a second
 
@@ -176,21 +177,25 @@ class Training:
     def _look(self) -> Look:
         """Keep the policy if it is the best so far, in episodes as it would be used."""
         self._looked = self._done * _LOOKS // self._job.decisions
-        traces = [self._exam(push) for push in sorted({0.0, _EXAM_PUSH * self._job.most_push})]
+        pushes = sorted({0.0, _EXAM_PUSH * self._job.most_push})
+        decisions = round(_LOOK_S / self._decision_s)
+        share = _LOOKS_TAKE * self._job.decisions / _LOOKS / len(pushes)
+        worlds = max(_LOOK_WORLDS, round(share / decisions))
+        traces = [self._exam(push, worlds, decisions) for push in pushes]
         score = sum(map(self._score, traces))
         is_better = score >= self._best
         if is_better:
             calm = self._learner.least_expected(traces[0])
             self._best, self._kept = score, self._current(calm)
         falls = sum(int((each.ends == FELL).sum()) for each in traces)
-        return Look(len(traces) * _LOOK_WORLDS * _LOOK_S, falls, is_better)
+        return Look(len(traces) * worlds * _LOOK_S, falls, is_better)
 
-    def _exam(self, most_push: float) -> Trace:
+    def _exam(self, most_push: float, worlds: int, decisions: int) -> Trace:
         """Episodes that are the same each time but for what the policy does."""
         draws = np.random.default_rng((self._job.seed, 2))
-        self._judges.begin(self._table, self._starts, self._scales, _LOOK_WORLDS, draws)
-        decisions = round(_LOOK_S / self._decision_s)
-        trace, _ = self._judges.run(self._learner.policy, decisions, 0.0, most_push)
+        self._judges.begin(self._table, self._starts, self._scales, worlds, draws)
+        policy, _ = self._learner.averages
+        trace, _ = self._judges.run(policy, decisions, 0.0, most_push)
         return trace
 
     def _score(self, trace: Trace) -> float:
@@ -200,7 +205,7 @@ class Training:
 
     def _current(self, calm: float) -> Kept:
         """Copies of policy and value, and what they were trained with."""
-        learner, job = self._learner, self._job
+        job, (policy, value) = self._job, self._learner.averages
         trained = {
             "decisions": self._done,
             "seed": job.seed,
@@ -208,11 +213,7 @@ class Training:
             **({"after": list(job.after)} if job.after else {}),
             **({} if self._from is None else {"from": self._from}),
         }
-        policy, value = (
-            Network(*(each.copy() for each in network))
-            for network in (learner.policy, learner.value)
-        )
-        return policy, value, trained, calm
+        return copy_of(policy), copy_of(value), trained, calm
 
     def _progress(self, trace: Trace, push: float, look: Look | None) -> Progress:
         ended = trace.lengths[(trace.ends == FELL) | (trace.ends == CUT)]

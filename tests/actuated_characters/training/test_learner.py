@@ -9,9 +9,11 @@ from actuated_characters.training import learner as module
 from actuated_characters.training.episode_types import CUT, FELL, Trace
 from actuated_characters.training.learner import (
     Adam,
+    Average,
     Learner,
     LearningSettings,
     backward,
+    copy_of,
     forward,
     make_network,
 )
@@ -212,6 +214,44 @@ def test_it_learns_what_pays(learner: Learner) -> None:
     assert rewards[-1] > -0.05
 
 
+def test_an_average_is_of_all_at_first_and_of_the_last_ones_later(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "_AVERAGED", 3)
+    rng = np.random.default_rng(8)
+    networks = [make_network(SIZES, 1.0, rng) for _ in range(5)]
+    weights = [each.weights_2.astype(float) for each in networks]
+    average = Average(networks[0])
+
+    for network in networks[1:3]:
+        average.take(network)
+    mean = sum(weights[:3]) / 3
+    np.testing.assert_allclose(average.network.weights_2, mean, atol=1e-6)
+
+    for network, each in zip(networks[3:], weights[3:], strict=True):
+        average.take(network)
+        mean = mean + (each - mean) / 3  # exponentially, by as many
+    np.testing.assert_allclose(average.network.weights_2, mean, atol=1e-6)
+    assert (networks[0].weights_2 == weights[0]).all(), "its own copy"
+
+
+def test_what_is_used_is_the_average_of_what_was_learnt(learner: Learner) -> None:
+    given = copy_of(learner.policy), copy_of(learner.value)
+    for each in (*given[0], *given[1]):
+        each += np.float32(0.1)
+    learner.take(*given)
+    before = [copy_of(each) for each in learner.averages]
+    trace = random_trace(16, 8)
+
+    learner.learn(trace, np.zeros_like(trace.actions), 0.3, 1e-3)
+
+    networks = (learner.policy, learner.value)
+    for average, start, now in zip(learner.averages, before, networks, strict=True):
+        assert (now.weights_3 != start.weights_3).any()
+        for mean, first, last in zip(average, start, now, strict=True):
+            np.testing.assert_allclose(mean, 0.5 * (first + last), atol=1e-6)
+
+
 def least_of(learner: Learner, trace: Trace, lows: Mapping[tuple[int, int], int]) -> bool:
     """Whether low states count: entries of a trace, world and first decision, so many of them."""
     states = np.random.default_rng(6).normal(size=(50, 4)).astype(np.float32)
@@ -220,6 +260,7 @@ def least_of(learner: Learner, trace: Trace, lows: Mapping[tuple[int, int], int]
     for (world, first), count in lows.items():
         trace.observations[world, first : first + count] = states[values.argmin()]
     learner.value.bias_3[:] += np.float32(0.5) - values.min()  # above the least that is told
+    learner.take(learner.policy, learner.value)
     return learner.least_expected(trace) < 0.5 + 0.5 * float(np.ptp(values))
 
 

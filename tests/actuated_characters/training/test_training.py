@@ -252,7 +252,7 @@ def test_the_best_is_kept_rather_than_the_last(
     monkeypatch.setattr(training._judges, "run", run)
     monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
     for number in range(3):
-        training._learner.policy.bias_3[:] = number
+        training._learner.averages[0].bias_3[:] = number
         bests.append(training._look().is_better)
 
     assert bests == [True, True, False]
@@ -314,6 +314,26 @@ def test_episodes_begin_more_often_where_others_fell(
     shares = training._worlds._starts._weights / even
     assert shares[0] > shares[2] > shares[1] > 0.0
     assert (training._judges._starts._weights == even).all(), "a look is the same each time"
+
+
+@pytest.mark.parametrize(("decisions", "worlds"), [(1, 2), (1_000_000, 2083)])
+def test_looks_take_a_share_of_what_is_tried(
+    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch, decisions: int, worlds: int
+) -> None:
+    """A twentieth in all: of a million decisions two looks with and without pushes, of 0.2 s."""
+    training = begin(replace(JOB, decisions=decisions))
+    counts = []
+
+    def run(*ignored: object) -> tuple[object, None]:
+        counts.append(len(training._judges._episodes))
+        return SimpleNamespace(ends=np.zeros((2, 6), np.intp), rewards=np.ones((2, 6))), None
+
+    monkeypatch.setattr(training._judges, "run", run)
+    monkeypatch.setattr(training._learner, "least_expected", lambda trace: 0.5)
+    look = training._look()
+
+    assert counts == [worlds, worlds]
+    assert look.seconds == pytest.approx(2 * worlds * 0.2)
 
 
 def test_it_looks_as_often_as_it_should(begin: Callable[..., Training]) -> None:
