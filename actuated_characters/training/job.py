@@ -16,6 +16,7 @@ from controller_node.controller_settings import ControllerSettings, check_planne
 from controller_node.parameters import make_controller_settings
 from controller_node.planner.policy.file import Policy
 from controller_node.planner.settings import PREDICTIVE, PlannerSettings, make_planner_settings
+from controller_node.references.steering.factory import GaitSettings, clips_of_gait
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
@@ -40,6 +41,7 @@ class Job:
     seed: int
     threads: int
     after: tuple[str, ...] = ()  # what else its motions begin after
+    gait: tuple[str, ...] = ()  # the clips by which it is steered, sorted
 
 
 def make_job(
@@ -85,7 +87,17 @@ def make_job(
         seed,
         threads,
         tuple(after),
+        _gait(exercises, plans),
     )
+
+
+def _gait(exercises: Sequence[Exercise], plans: Sequence[RunPlan]) -> tuple[str, ...]:
+    clips = [
+        clips_of_gait(plan.character, GaitSettings.of(plan.controller))
+        for exercise, plan in zip(exercises, plans, strict=True)
+        if exercise.is_steered
+    ]
+    return tuple(sorted(Path(clip).stem for each in clips for clip in each))
 
 
 def _check_same(exercise: Exercise, first: Values, values: Values) -> None:

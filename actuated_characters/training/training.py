@@ -148,6 +148,7 @@ class Training:
             "character": job.character.name,
             "dofs": list(job.character.layout.dof_names),
             "clips": list(job.names),
+            **({"gait": list(job.gait)} if job.gait else {}),
             "rate": job.settings.parameters.rate_hz,
             "hold": rules.hold,
             "mass": round(job.character.mass, 6),

@@ -14,6 +14,7 @@ from controller_node.planner.policy.file import (
 from controller_node.planner.settings import HYBRID, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
+from controller_node.references.steering.factory import GaitSettings, clips_of_gait
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
@@ -35,7 +36,7 @@ def choose_policies(character: Character, values: Values, clips: Sequence[str]) 
 
     Raises:
         ConfigurationError: there is none of the motion, or of a clip and the planner is `policy`;
-            or it is malformed, another character's, or of another rate.
+            or it is malformed, another character's, of another rate, or steered by other clips.
     """
     own = _read_own(character, values)
     others = {clip: _of_clip(clip, own, character) for clip in clips}
@@ -86,7 +87,20 @@ def _read_own(character: Character, values: Values) -> Policy:
         tracked = f"the clip is {motion}" if reference == "clip" else f"'reference' is {reference}"
         trained = ", ".join(policy.about["clips"])
         raise ConfigurationError(f"the policy '{name}' was trained on {trained}; {tracked}")
+    if reference == STEERED:
+        _check_gait(policy, name, clips_of_gait(character, GaitSettings.of(values)))
     return policy
+
+
+def _check_gait(policy: Policy, name: str, clips: Sequence[str]) -> None:
+    """Raise ConfigurationError if a policy was steered by other clips; older files do not say."""
+    given = sorted(Path(clip).stem for clip in clips)
+    trained = policy.about.get("gait", given)
+    if given != trained:
+        raise ConfigurationError(
+            f"the policy '{name}' was steered by {', '.join(trained)}; 'steering.clips' are "
+            f"{', '.join(given)}"
+        )
 
 
 def _knows(policy: Policy, motion: str) -> bool:

@@ -1,9 +1,10 @@
 """A trained policy's file: a network, what it is told, what it answers, and what it was trained on.
 
 An archive of numpy (`.npz`) without pickled objects. `about` is a JSON text: format, character,
-its mass, clips, rate, ticks of a decision, largest action, gravity, what it expects while it is
-calm, what it was trained with and the figures that it was accepted with; the arrays have the names
-of the fields of `Network`, `ObservationScales` and `Policy`.
+its mass, clips, those by which it is steered (`gait`), rate, ticks of a decision, largest action,
+gravity, what it expects while it is calm, what it was trained with and the figures that it was
+accepted with; the arrays have the names of the fields of `Network`, `ObservationScales` and
+`Policy`.
 """
 
 import io
@@ -177,8 +178,10 @@ def _read_about(content: Mapping[str, Any]) -> Mapping[str, Any]:
     for name, (kind, words) in _ABOUT.items():
         if not isinstance(about.get(name), kind):
             raise ValueError(f"'{name}' in 'about' must be {words}")
-    if not all(isinstance(name, str) for name in (*about["dofs"], *about["clips"])):
-        raise ValueError("'dofs' and 'clips' in 'about' must be lists of names")
+    for names in ("dofs", "clips", "gait"):
+        named = about.get(names, [])
+        if not isinstance(named, list) or not all(isinstance(name, str) for name in named):
+            raise ValueError(f"'{names}' in 'about' must be a list of names")
     for name in ("decisions", "pushes_ns"):
         number = about["trained"].get(name, 0)
         if not isinstance(number, int | float) or not 0 <= number < math.inf:

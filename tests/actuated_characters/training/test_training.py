@@ -349,3 +349,14 @@ def test_it_looks_as_often_as_it_should(begin: Callable[..., Training]) -> None:
     train(training)
 
     assert looks == [5, 10]
+
+
+def test_a_policy_says_by_which_clips_it_was_steered(begin: Callable[..., Training]) -> None:
+    """Not those that it keeps as they are."""
+    exercises = [Exercise("humanoid", name) for name in ("kick", "steered")]
+    clips = {"steering.clips": ["walk", "crawl"]}
+
+    job = make_job(exercises, clips, decisions=1)
+
+    assert looked_at(begin(replace(JOB, gait=job.gait))).best({}).about["gait"] == ["crawl", "walk"]
+    assert "gait" not in looked_at(begin()).best({}).about

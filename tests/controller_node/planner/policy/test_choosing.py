@@ -23,10 +23,10 @@ def values_of(**given: object) -> Values:
     return resolve_for(HUMANOID, {**walk, **given})
 
 
-def write(folder: Path, *clips: str, rate: int = 240) -> str:
+def write(folder: Path, *clips: str, rate: int = 240, **about: object) -> str:
     """A random policy's file that says that it was trained on some clips."""
     policy, path = random_policy(HUMANOID, rate=rate), folder / "trained.npz"
-    write_policy(path, replace(policy, about={**policy.about, "clips": list(clips)}))
+    write_policy(path, replace(policy, about={**policy.about, "clips": list(clips), **about}))
     return str(path)
 
 
@@ -75,3 +75,22 @@ def test_a_shipped_one_of_another_rate_is_none(tmp_path: Path) -> None:
 
     with pytest.raises(ConfigurationError, match="no policy of getup_faceup, getup_facedown, to"):
         choose_policies(HUMANOID, values, GET_UPS)
+
+
+@pytest.mark.parametrize("about", [{}, {"gait": ["run", "walk"]}])  # older files do not say
+def test_a_steered_policy_takes_the_clips_that_it_was_steered_by(
+    tmp_path: Path, about: dict[str, object]
+) -> None:
+    values = values_of(reference="steered", policy=write(tmp_path, "steered", **about))
+
+    assert choose_policies(HUMANOID, values, []).own.about["clips"] == ["steered"]
+
+
+def test_a_policy_that_was_steered_by_other_clips_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path, "steered", gait=["crawl", "walk"])
+    values = values_of(reference="steered", policy=path)
+
+    with pytest.raises(
+        ConfigurationError, match=r"steered by crawl, walk; 'steering.clips' are run, walk$"
+    ):
+        choose_policies(HUMANOID, values, [])
