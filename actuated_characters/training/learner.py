@@ -20,7 +20,6 @@ from msgs_config.arrays import FloatArray, IntArray, SingleArray
 _LARGEST_GRADIENT = 1.0  # norm to which a gradient is shortened
 _MEAN_KEEPS, _SQUARE_KEEPS, _LEAST_ROOT = 0.9, 0.999, 1e-8  # Adam's
 _LOG_RATIO_MOST = 20.0
-_AVERAGED = 100  # traces, over which networks are averaged
 _VALUE_RATE = 1e-3
 _VALUE_WEIGHT = 4.0
 _LEAST_CALM = 1e-3
@@ -38,6 +37,7 @@ class LearningSettings:
     part: int = 768  # decisions of a step
     clip: float = 0.2  # of the ratio of probabilities
     largest: float = 2.0  # action
+    averaged: int = 30  # traces, over which networks are averaged
 
 
 class Adam:
@@ -66,14 +66,14 @@ class Adam:
 class Average:
     """The mean of what a network was lately, which scatters less than what it is."""
 
-    def __init__(self, network: Network) -> None:
-        """Begin with what it is."""
+    def __init__(self, network: Network, most: int) -> None:
+        """Begin with what it is; from so many on, those of before fade."""
         self.network = copy_of(network)
-        self._count = 1
+        self._count, self._most = 1, most
 
     def take(self, network: Network) -> None:
         """Count what it is now."""
-        self._count = min(self._count + 1, _AVERAGED)
+        self._count = min(self._count + 1, self._most)
         for mean, weights in zip(self.network, network, strict=True):
             mean += np.float32(1.0 / self._count) * (weights - mean)
 
@@ -138,7 +138,7 @@ class Learner:
         self.policy = make_network((inputs, hidden, hidden, actions), 0.01, rng)
         self.value = make_network((inputs, hidden // 2, hidden // 2, 1), 0.1, rng)
         self._policy_steps, self._value_steps = Adam(self.policy), Adam(self.value)
-        self._averages = Average(self.policy), Average(self.value)
+        self._average()
         self._threads = ThreadPoolExecutor(1)
 
     def take(self, policy: Network, value: Network) -> None:
@@ -146,7 +146,7 @@ class Learner:
         for own, given in ((self.policy, policy), (self.value, value)):
             for weights, wanted in zip(own, given, strict=True):
                 weights[:] = wanted
-        self._averages = Average(self.policy), Average(self.value)
+        self._average()
 
     @property
     def averages(self) -> tuple[Network, Network]:
@@ -170,6 +170,11 @@ class Learner:
         valuing.result()
         for average, network in zip(self._averages, (self.policy, self.value), strict=True):
             average.take(network)
+
+    def _average(self) -> None:
+        """Begin to average."""
+        most = self._settings.averaged
+        self._averages = Average(self.policy, most), Average(self.value, most)
 
     def _lesson(self, trace: Trace, noise: SingleArray) -> Lesson:
         settings = self._settings

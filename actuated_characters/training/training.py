@@ -24,10 +24,10 @@ _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
 _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
 _GROWS, _SHRINKS = 0.15, 0.1  # N s a trace
 _LATELY = 0.05  # share of a trace in the mean of falls
+_AVERAGED = 0.02  # of a training, over which its networks are averaged
 _LOOKS = 20  # at how good a policy is, in a training
 _LOOKS_TAKE = 0.05  # decisions of all looks, against those of the training
 _LOOK_WORLDS, _LOOK_S = 16, 10.0  # least worlds
-_EXAM_PUSH = 0.5  # of the hardest push, in half of a look
 _FALL_COSTS = 1.0  # reward, of one fall a second
 
 
@@ -88,7 +88,9 @@ class Training:
         rules = self._worlds.rules
         self._decision_s = rules.hold * rules.period
         inputs = len(self._scales.deviation) + self._scales.frame_mean.size
-        settings = LearningSettings(largest=LARGEST_ACTION)
+        traces = job.decisions / (_WORLDS * _DECISIONS)
+        averaged = max(round(_AVERAGED * traces), 1)
+        settings = LearningSettings(largest=LARGEST_ACTION, averaged=averaged)
         self._learner = Learner((inputs, HIDDEN, len(rules.unit)), learning, settings)
         self._push, self._falls = _LEAST_PUSH, _OFTEN
         self._looked = self._done * _LOOKS // job.decisions
@@ -178,7 +180,7 @@ class Training:
     def _look(self) -> Look:
         """Keep the policy if it is the best so far, in episodes as it would be used."""
         self._looked = self._done * _LOOKS // self._job.decisions
-        pushes = sorted({0.0, _EXAM_PUSH * self._job.most_push})
+        pushes = sorted({0.0, self._job.most_push})
         decisions = round(_LOOK_S / self._decision_s)
         share = _LOOKS_TAKE * self._job.decisions / _LOOKS / len(pushes)
         worlds = max(_LOOK_WORLDS, round(share / decisions))

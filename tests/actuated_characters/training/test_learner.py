@@ -214,14 +214,11 @@ def test_it_learns_what_pays(learner: Learner) -> None:
     assert rewards[-1] > -0.05
 
 
-def test_an_average_is_of_all_at_first_and_of_the_last_ones_later(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(module, "_AVERAGED", 3)
+def test_an_average_is_of_all_at_first_and_of_the_last_ones_later() -> None:
     rng = np.random.default_rng(8)
     networks = [make_network(SIZES, 1.0, rng) for _ in range(5)]
     weights = [each.weights_2.astype(float) for each in networks]
-    average = Average(networks[0])
+    average = Average(networks[0], 3)
 
     for network in networks[1:3]:
         average.take(network)
@@ -233,6 +230,9 @@ def test_an_average_is_of_all_at_first_and_of_the_last_ones_later(
         mean = mean + (each - mean) / 3  # exponentially, by as many
     np.testing.assert_allclose(average.network.weights_2, mean, atol=1e-6)
     assert (networks[0].weights_2 == weights[0]).all(), "its own copy"
+    last = Average(networks[0], 1)
+    last.take(networks[1])
+    np.testing.assert_allclose(last.network.weights_2, weights[1], atol=1e-6)
 
 
 def test_what_is_used_is_the_average_of_what_was_learnt(learner: Learner) -> None:
