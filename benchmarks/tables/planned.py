@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +26,8 @@ BALL_LIFETIME = 0.6  # s, of which it flies 0.2
 MISSED = 0.2  # m that a walk is beside its clip where a ball misses it
 EIGHT = "1,0,0.4@1 1,0,-0.4@16.7 2.2,0,0.7@32.4 2.2,0,-0.7@41.4 0,0,0@50.4"
 STOP = "2.5,0,0@0 0,0,0@5.5"
+ZIG_ZAG_SPEEDS, ZIG_ZAG_TURNS = (0.4, 2.2), (0.3, 1.0)  # m/s, rad/s
+ZIG_ZAG_LASTS, SHARPEST = (1.0, 3.0), 1.5  # s, m/s^2 to the side
 JOLT, JOLT_LASTS = 5.0, 0.2  # N s, s
 _TIME = re.compile(r"(?:@|at=)([0-9.]+)")  # time of a push or a throw
 STANDS, OVER = 0.15, 0.25  # m/s, s: it stands if it is slower than this in the mean over that time
@@ -180,15 +183,17 @@ def measure_push(seen: Seen) -> dict[str, Fact]:
 
 
 def course_cases(kind: str, options: Options) -> Iterator[Case]:
-    """A figure of eight, walked and then run, that ends in a stop; a stop from running; moods.
+    """A figure of eight, walked and then run, that ends in a stop; another stop; zig-zags; moods.
 
     A jolt at its beginning comes from another side in each run, so that runs of a policy differ.
     """
     seconds, commands, since = {
         "eight": (60.0, EIGHT, 50.4),
         "stop": (10.0, STOP, 5.5),
+        "zig-zag": (60.0, "", 0.0),
         "moods": (60.0, "", 0.0),
     }[kind]
+    drive = zig_zag if kind == "zig-zag" else partial(random_drive, SteeringLimits())
     for seed in options.seeds(5):
         side = np.random.default_rng(seed).uniform(-math.pi, math.pi)
         x, y = JOLT / JOLT_LASTS * math.cos(side), JOLT / JOLT_LASTS * math.sin(side)
@@ -199,9 +204,21 @@ def course_cases(kind: str, options: Options) -> Iterator[Case]:
             {"wrench_duration": JOLT_LASTS},
             planner(seed),
             pushes=[f"root:{x!r},{y!r},0@0.3"],
-            commands=commands or random_drive(SteeringLimits(), seconds, 100 + seed),
+            commands=commands or drive(seconds, 100 + seed),
             since=since,
         )
+
+
+def zig_zag(seconds: float, seed: int) -> str:
+    """Velocities as `--cmd-vel` takes them: ahead at any speed, to the left and right in turn."""
+    rng, time, drive = np.random.default_rng((seed, 8)), 0.0, list[str]()
+    side = rng.choice((-1.0, 1.0))
+    while time < seconds:
+        speed = rng.uniform(*ZIG_ZAG_SPEEDS)
+        turn = side * min(rng.uniform(*ZIG_ZAG_TURNS), SHARPEST / speed)
+        drive.append(f"{speed:.3f},0,{turn:.3f}@{time:.3f}")
+        side, time = -side, time + rng.uniform(*ZIG_ZAG_LASTS)
+    return " ".join(drive)
 
 
 def measure_course(seen: Seen) -> dict[str, Fact]:
@@ -246,6 +263,9 @@ TABLES: Mapping[str, RunTable] = {
         asked_for=("jolt", "drags", "heavy balls", "any"),
     ),
     "courses": RunTable(
-        "commanded courses, planned", ["eight", "stop", "moods"], course_cases, measure_course
+        "commanded courses, planned",
+        ["eight", "stop", "zig-zag", "moods"],
+        course_cases,
+        measure_course,
     ),
 }

@@ -176,6 +176,24 @@ def test_the_eight_is_a_circle_to_the_left_and_one_to_the_right_walked_and_run()
     assert (courses[0].forward, courses[-1].forward) == (0.0, 0.0)
 
 
+def test_a_zig_zag_turns_to_the_left_and_right_in_turn_within_the_limits() -> None:
+    (case,) = course_cases("zig-zag", Options(runs=1))
+    velocities = [
+        tuple(map(float, each.split("@")[0].split(","))) for each in case.commands.split()
+    ]
+    ahead, aside, turns = np.array(velocities).T
+    reference = reference_of("zig-zag")
+    times = [float(each.split("@")[1]) for each in case.commands.split()]
+
+    assert len(turns) > 20
+    assert (turns[1:] * turns[:-1] < 0.0).all()
+    assert not aside.any()
+    assert (ahead.min() >= 0.4, ahead.max() <= 2.2, np.abs(turns).max() <= 1.0) == (True,) * 3
+    assert np.abs(ahead * turns).max() == pytest.approx(1.5, abs=0.01)
+    seen = [reference.course(round(time * RATE) - 1).turn for time in times[1:]]
+    assert (np.sign(seen) == np.sign(turns[:-1])).all()
+
+
 def test_the_stop_is_from_the_largest_speed() -> None:
     reference = reference_of("stop")
 
