@@ -1,6 +1,7 @@
 """Measures a run from its serialised messages."""
 
 import json
+from collections import deque
 from contextlib import suppress
 from typing import Any
 
@@ -31,15 +32,15 @@ HEARD = frozenset(
 )
 """The topics that the figures are measured from."""
 
-_MOST_EARLY = 20_000  # messages before the configuration
-_MOST_EARLY_BYTES = 1 << 26  # bytes of the messages before the configuration
+_MOST_EARLY = 20_000  # messages before the configuration; of more the oldest go
+_MOST_EARLY_BYTES = 1 << 26  # bytes of them
 
 
 class MetricsCollector:
     """Takes messages as they come; has the figures at the end.
 
     A message can be read only once the simulator's configuration is known; messages that come
-    before it are kept until then.
+    before it are kept until then, the newest ones, should it take long.
     """
 
     _measurement: Measurement
@@ -51,7 +52,7 @@ class MetricsCollector:
         self._states, self._references = JointStateDecoder(), JointStateDecoder()
         self._configuration: RunConfiguration | None = None
         self._texts: set[str] = set()  # the texts of all configurations so far
-        self._early: list[tuple[str, bytes, int | None]] = []
+        self._early: deque[tuple[str, bytes, int | None]] = deque()
         self._early_bytes = 0
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS.values())
         self._first_command_ns: int | None = None
@@ -76,10 +77,10 @@ class MetricsCollector:
         if topic == CONFIGURATION:
             self._configure(decode_string(raw))
         elif self._configuration is None:
-            self._early_bytes += len(raw)
-            if len(self._early) == _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
-                raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
             self._early.append((topic, raw, published_ns))
+            self._early_bytes += len(raw)
+            while len(self._early) > _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
+                self._early_bytes -= len(self._early.popleft()[1])
         elif topic == topics.JOINT_TORQUES.name:
             self._first_command_ns = self._first_command_ns or published_ns
         elif topic == MODE:
@@ -102,6 +103,8 @@ class MetricsCollector:
         Raises:
             RecordingError: no simulator's configuration has come.
         """
+        if self._early and self._configuration is None:
+            raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
         if self._configuration is None:
             raise RecordingError("no simulator was heard")
         self._assembler.finish()
@@ -133,7 +136,7 @@ class MetricsCollector:
         self._configuration = found
         self._measurement = Measurement(found, _postures(text))
         self._assembler = TickAssembler(self._measurement, int(found.parameters["rate"]))
-        early, self._early = self._early, []
+        early, self._early = self._early, deque()
         for message in early:
             self.take(*message)
 

@@ -17,7 +17,7 @@ from msgs_config.messages.session import (
 )
 from msgs_config.messages.topic import SessionPlace
 
-_MOST_HELD = 1000  # messages before the first state; few topics have any then
+_MOST_HELD = 1000  # messages before the first state
 
 
 class Heard(NamedTuple):
@@ -51,6 +51,8 @@ class SessionFilter:
     """Belongs to the session that is given, or to the first whose state comes, and to no other.
 
     Messages of others are dropped and counted; messages before the first state are held until then.
+    On a busy machine that may be long: a topic can be heard seconds after the others. Too many are
+    held as the middleware would: what is latched stays, for it comes once, and the oldest go.
     """
 
     def __init__(self, given: str, tell: Callable[[str], None]) -> None:
@@ -58,7 +60,7 @@ class SessionFilter:
         self.bound: str | None = given or None
         self._foreign = ForeignSessions()
         self._tell = tell
-        self._pending: deque[tuple[str, Heard]] = deque(maxlen=_MOST_HELD)
+        self._pending: deque[tuple[str, Heard]] = deque()
 
     def dropped(self, topic: str) -> int:
         """How many messages of a topic, by its name in the bag, were dropped."""
@@ -72,7 +74,7 @@ class SessionFilter:
         if self.bound is None and message.recorded.own_name == topics.JOINT_STATES.name:
             return [*self._bind(session), message]
         if self.bound is None:
-            self._pending.append((session, message))
+            self._hold(session, message)
             return []
         if session != self.bound:
             self._drop(session, message)
@@ -83,6 +85,13 @@ class SessionFilter:
         """The rest to record at the end: that of the only simulator, if it had no state yet."""
         sessions = {session for session, _ in self._pending}
         return self._bind(sessions.pop()) if len(sessions) == 1 else []
+
+    def _hold(self, session: str, message: Heard) -> None:
+        self._pending.append((session, message))
+        if len(self._pending) > _MOST_HELD:
+            latched = (each.recorded.topic.quality.is_latched for _, each in self._pending)
+            oldest = next((at for at, is_latched in enumerate(latched) if not is_latched), 0)
+            del self._pending[oldest]
 
     def _bind(self, session: str) -> list[Heard]:
         self.bound = session

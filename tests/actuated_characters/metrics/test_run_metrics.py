@@ -511,6 +511,23 @@ def test_early_and_repeated_messages_change_nothing() -> None:
     assert heard([configured, *messages, (topic, raw, 10**12)]).results()[0] == metrics
 
 
+def test_however_late_a_configuration_comes_the_newest_messages_are_measured() -> None:
+    messages, configured = pendulum_messages(), configuration_message()
+    metrics = heard([configured, *messages]).results()[0]
+    many = [messages[0]] * 30_000  # seconds of a reference, until the simulator is heard
+    large = [(topics.DIAGNOSTICS.name, bytes(1 << 24), 0)] * 5
+
+    for early in many, large:
+        assert heard([*early, *messages[:30], configured, *messages[30:]]).results()[0] == metrics
+
+
+def test_without_a_configuration_there_are_no_figures() -> None:
+    with pytest.raises(RecordingError, match="nothing on 'sim_node/configuration'"):
+        heard(pendulum_messages()).results()
+    with pytest.raises(RecordingError, match="no simulator was heard"):
+        heard([]).results()
+
+
 def test_commands_are_counted_as_the_simulator_reports_them_last() -> None:
     messages = [
         report(SIMULATOR, 5, rejected=1, duplicate=2, tick=3),
@@ -530,11 +547,6 @@ def test_a_simulator_that_is_restarted_is_an_error() -> None:
 
     with pytest.raises(RecordingError, match="restarted"):
         collector.take(*configuration_message(gravity=1.62))
-
-
-def test_without_a_simulator_there_are_no_figures() -> None:
-    with pytest.raises(RecordingError, match="no simulator"):
-        heard(pendulum_messages()).results()[0]
 
 
 @pytest.mark.parametrize("topic", [STATE, REFERENCE, CONFIGURATION])

@@ -107,6 +107,18 @@ def test_what_came_before_the_first_state_is_kept_in_front_of_it() -> None:
     assert len(lines) == 1 and ONE in lines[0] and OTHER in lines[0]
 
 
+def test_however_late_the_first_state_comes_what_is_latched_is_kept() -> None:
+    latched = [heard(CONFIGURATION, ONE), heard(topics.EPISODE, ONE)]
+    torques = [heard(topics.JOINT_TORQUES, ONE, number) for number in range(1, 5000)]
+    state = heard(topics.JOINT_STATES, ONE, 5000)
+
+    _, passed, _ = filtered("", [*latched, *torques, state])
+
+    assert passed[:2] == latched
+    assert passed[2:] == [*torques[-len(passed[2:-1]) :], state]
+    assert len(passed) > 500
+
+
 def test_of_a_simulator_that_has_had_no_state_yet_the_configuration_is_kept_at_the_end() -> None:
     message = heard(CONFIGURATION, ONE)
 
