@@ -67,6 +67,13 @@ class Draws(NamedTuple):
     push: FloatArray  # (t, 4) 0 to 1: whether, from where, how strong, how long
 
 
+class Taught(NamedTuple):
+    """What teachers say to decisions, and how much that counts against what was tried."""
+
+    actions: SingleArray  # (m, a)
+    shares: SingleArray  # (m,) 0 to 1; 0 where there is no teacher
+
+
 class Trace(NamedTuple):
     """What happened, for each decision."""
 

@@ -1,7 +1,7 @@
 """What is to be trained, and what its training may begin with."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,7 @@ class Job:
     threads: int
     after: tuple[str, ...] = ()  # what else its motions begin after
     gait: tuple[str, ...] = ()  # the clips by which it is steered, sorted
+    teachers: tuple[Policy | None, ...] = ()  # of the exercises, which are the first references
 
 
 def make_job(
@@ -89,6 +90,26 @@ def make_job(
         tuple(after),
         _gait(exercises, plans),
     )
+
+
+def taught_by(job: Job, teachers: Sequence[Policy]) -> Job:
+    """The same job with policies of single exercises, which its own imitates at first.
+
+    Raises:
+        ConfigurationError: one was trained otherwise, or knows none of the exercises.
+    """
+    known = [[Path(clip).stem for clip in each.about["clips"]] for each in teachers]
+    wanted = [Path(name).stem for name in job.names]
+    for teacher, clips in zip(teachers, known, strict=True):
+        check_start(job, teacher)
+        if not set(clips) & set(wanted):
+            raise ConfigurationError(
+                f"the policy to imitate was trained on {', '.join(clips)}, none of which is "
+                f"trained here: {', '.join(wanted)}"
+            )
+    pairs = list(zip(teachers, known, strict=True))
+    of_each = (next((one for one, clips in pairs if name in clips), None) for name in wanted)
+    return replace(job, teachers=tuple(of_each))
 
 
 def _gait(exercises: Sequence[Exercise], plans: Sequence[RunPlan]) -> tuple[str, ...]:

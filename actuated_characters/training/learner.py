@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from actuated_characters.training.episode_types import CUT, FELL, Trace
+from actuated_characters.training.episode_types import CUT, FELL, Taught, Trace
 from controller_node.planner.compiled.network import Network
 from msgs_config.arrays import FloatArray, IntArray, SingleArray
 
@@ -124,6 +124,7 @@ class Lesson:
     chances: SingleArray  # (m,) logarithms of the actions' probabilities, but for a constant
     advantages: SingleArray  # (m,) in standard deviations
     values: SingleArray  # (m,)
+    taught: Taught | None = None
 
 
 class Learner:
@@ -158,12 +159,20 @@ class Learner:
         """End its thread."""
         self._threads.shutdown()
 
-    def learn(self, trace: Trace, noise: SingleArray, spread: float, rate: float) -> None:
+    def learn(
+        self,
+        trace: Trace,
+        noise: SingleArray,
+        spread: float,
+        rate: float,
+        taught: Taught | None = None,
+    ) -> None:
         """Learn from a trace (worlds, decisions), by steps of the policy of a rate.
 
-        `noise` (worlds, decisions, a) are the draws that were added to its actions, by `spread`.
+        `noise` (worlds, decisions, a) are the draws that were added to its actions, by `spread`;
+        `taught` is what teachers say to it.
         """
-        lesson = self._lesson(trace, noise)
+        lesson = self._lesson(trace, noise, taught)
         orders = [self._rng.permutation(len(lesson.values)) for _ in range(self._settings.passes)]
         valuing = self._threads.submit(self._learn_value, lesson, orders)
         self._learn_policy(lesson, orders, np.float32(1.0 / spread), rate)
@@ -176,7 +185,7 @@ class Learner:
         most = self._settings.averaged
         self._averages = Average(self.policy, most), Average(self.value, most)
 
-    def _lesson(self, trace: Trace, noise: SingleArray) -> Lesson:
+    def _lesson(self, trace: Trace, noise: SingleArray, taught: Taught | None = None) -> Lesson:
         settings = self._settings
         worlds, decisions = trace.rewards.shape
         whole = 1.0 / (1.0 - settings.discount)  # of a reward of one, for good
@@ -200,6 +209,7 @@ class Learner:
             (-0.5 * noise * noise).sum(2).ravel(),
             centred.astype(np.float32).ravel(),
             ((advantages + values) / whole).astype(np.float32).ravel(),
+            taught,
         )
 
     def least_expected(self, trace: Trace) -> float:
@@ -240,7 +250,7 @@ class Learner:
     def _slope(
         self, lesson: Lesson, part: IntArray, means: SingleArray, inverse: np.float32
     ) -> SingleArray:
-        """The slope (m, a) of the clipped objective at the means."""
+        """The slope (m, a) of the clipped objective at the means, and of what teachers say."""
         settings, advantage = self._settings, lesson.advantages[part]
         off = (lesson.actions[part] - means) * inverse
         log_ratio = (-0.5 * off * off).sum(1) - lesson.chances[part]
@@ -252,6 +262,10 @@ class Learner:
         slope = counts[:, np.newaxis] * off * inverse
         over = np.abs(means) - np.float32(settings.largest)
         slope += _OVER_WEIGHT / np.float32(len(part)) * np.maximum(over, 0.0) * np.sign(means)
+        if lesson.taught is not None:  # half the square of what is off
+            share = lesson.taught.shares[part, np.newaxis]
+            wrong = (means - lesson.taught.actions[part]) / np.float32(len(part))
+            slope += share * (wrong - slope)
         single: SingleArray = slope.astype(np.float32)
         return single
 

@@ -7,10 +7,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from actuated_characters.training.episode_types import CUT, FELL, Trace
+from actuated_characters.training.episode_types import CUT, FELL, Taught, Trace
 from actuated_characters.training.job import HIDDEN, Job, decisions_of
 from actuated_characters.training.learner import Learner, LearningSettings, copy_of
 from actuated_characters.training.references import make_scales, make_table
+from actuated_characters.training.teachers import Teachers, heard
 from actuated_characters.training.worlds import LARGEST_ACTION, TrainingWorlds
 from controller_node.planner.compiled.network import Network
 from controller_node.planner.policy.file import Policy, write_policy
@@ -19,7 +20,7 @@ from msgs_config.arrays import FloatArray
 _WORLDS, _DECISIONS = 64, 48  # of a trace
 _SPREADS = (1.0, 0.3)  # standard deviation of what is tried, at first and in the end
 _RATES = (1.2e-3, 2e-4)  # of a policy's steps, at first and in the end
-_FROM = 0.5  # of that course, from where on it goes where it begins with what another policy can
+_FROM = 0.5  # of that course, from where on it goes where it has what other policies can
 _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
 _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
 _GROWS, _SHRINKS = 0.15, 0.1  # N s a trace
@@ -85,6 +86,10 @@ class Training:
             np.random.default_rng((job.seed, number, self._done)) for number in (0, 1)
         )  # other ones where it goes on
         self._worlds.begin(self._table, self._starts, self._scales, _WORLDS, trying)
+        self._imitated = [
+            name for name, each in zip(job.names, job.teachers, strict=False) if each is not None
+        ]
+        self._teachers = Teachers(job.teachers, self._starts, self._scales)
         rules = self._worlds.rules
         self._decision_s = rules.hold * rules.period
         inputs = len(self._scales.deviation) + self._scales.frame_mean.size
@@ -129,7 +134,7 @@ class Training:
         spread, rate = self._spread_and_rate()
         push = min(self._push, self._job.most_push)
         trace, noise = self._worlds.run(self._learner.policy, _DECISIONS, spread, push)
-        self._learner.learn(trace, noise, spread, rate)
+        self._learner.learn(trace, noise, spread, rate, self._taught(trace))
         self._worlds.prefer_hard_starts(trace)
         self._done += trace.rewards.size
         self._lead_pushes(trace)
@@ -166,10 +171,16 @@ class Training:
     def _spread_and_rate(self) -> tuple[float, float]:
         """Of what is tried, and of the policy's steps, by how far the training is."""
         share = min(self._done / self._job.decisions, 1.0)
-        if self._from is not None:
+        if self._from is not None or self._imitated:
             share = _FROM + (1.0 - _FROM) * share
         spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
         return spread, rate
+
+    def _taught(self, trace: Trace) -> Taught | None:
+        """What teachers would have done in a trace."""
+        observations = trace.observations.reshape(trace.rewards.size, -1)
+        share = heard(self._done / self._job.decisions)
+        return self._teachers.answer(observations, trace.rows.ravel(), share)
 
     def _lead_pushes(self, trace: Trace) -> None:
         falls = float((trace.ends == FELL).mean()) / self._decision_s
@@ -215,6 +226,7 @@ class Training:
             "pushes_ns": round(min(self._push, job.most_push), 1),
             **({"after": list(job.after)} if job.after else {}),
             **({} if self._from is None else {"from": self._from}),
+            **({"imitated": self._imitated} if self._imitated else {}),
         }
         return copy_of(policy), copy_of(value), trained, calm
 

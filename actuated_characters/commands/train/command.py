@@ -99,6 +99,13 @@ def _add_how(command: argparse.ArgumentParser) -> None:
         help="begin with what a shipped policy, or one in a file, can, of whatever motion",
     )
     command.add_argument(
+        "--imitate",
+        nargs="*",
+        metavar="POLICY",
+        help="learn from what other policies, each of some of the clips, would have done, at first "
+        "from that alone (those that are shipped)",
+    )
+    command.add_argument(
         "--set",
         action="append",
         default=[],
@@ -117,7 +124,7 @@ def _train(options: argparse.Namespace) -> None:
 
     exercises, output = preparing.asked_for(options)
     began = time.process_time()
-    job = preparing.job_of(options, exercises)
+    job = preparing.taught(options, preparing.job_of(options, exercises))
     start = preparing.start_of(options, job, output)
     output.parent.mkdir(exist_ok=True)
     training = Training(job, start, resumes=options.resume)

@@ -11,8 +11,8 @@ from actuated_characters.commands.common.result_file import check_not_lost, resu
 from actuated_characters.commands.common.settings import node_settings
 from actuated_characters.commands.train.command import DECISIONS_A_MINUTE, FOLDER, SUFFIX
 from actuated_characters.training.exercises import Exercise
-from actuated_characters.training.job import Job, check_resumed, check_start, make_job
-from controller_node.planner.policy.file import STEERED, Policy, read_policy
+from actuated_characters.training.job import Job, check_resumed, check_start, make_job, taught_by
+from controller_node.planner.policy.file import STEERED, Policy, read_policy, shipped_policies
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import expand_clips
 from msgs_config.errors import ConfigurationError
@@ -87,6 +87,23 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
         threads=threads,
         after=options.after,
     )
+
+
+def taught(options: argparse.Namespace, job: Job) -> Job:
+    """The job with the policies that `--imitate` names, or the shipped ones of its exercises.
+
+    Raises:
+        ConfigurationError: there are none, or they cannot be imitated.
+    """
+    if options.imitate is None:
+        return job
+    shipped = shipped_policies()
+    names = options.imitate or [each for each in job.names if each in shipped]
+    if not names:
+        raise ConfigurationError(
+            f"--imitate: no policy of {', '.join(job.names)} is shipped; name a file"
+        )
+    return taught_by(job, [read_policy(name, job.character) for name in names])
 
 
 def start_of(options: argparse.Namespace, job: Job, output: Path) -> Policy | None:
