@@ -23,7 +23,8 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.messages.clock import TickClock
 from msgs_config.parameters import Values
 
-HIDDEN = 128  # units of each of a policy's two layers
+HIDDEN = 128
+"""Units of each of a policy's two layers, where nothing else is said."""
 _OWN = ("reference", "clip", "steering.")  # parameters, by how they begin, that differ by exercise
 
 
@@ -41,6 +42,7 @@ class Job:
     seed: int
     threads: int
     after: tuple[str, ...] = ()  # what else its motions begin after
+    hidden: int = HIDDEN  # units of each of the policy's two layers
     gait: tuple[str, ...] = ()  # the clips by which it is steered, sorted
     teachers: tuple[Policy | None, ...] = ()  # of the exercises, which are the first references
 
@@ -54,6 +56,7 @@ def make_job(
     seed: int = 0,
     threads: int = 1,
     after: Sequence[str] = (),
+    hidden: int = HIDDEN,
 ) -> Job:
     """The job of some exercises of one character; `controller` has the controller's parameters.
 
@@ -88,6 +91,7 @@ def make_job(
         seed,
         threads,
         tuple(after),
+        hidden,
         _gait(exercises, plans),
     )
 
@@ -101,7 +105,7 @@ def taught_by(job: Job, teachers: Sequence[Policy]) -> Job:
     known = [[Path(clip).stem for clip in each.about["clips"]] for each in teachers]
     wanted = [Path(name).stem for name in job.names]
     for teacher, clips in zip(teachers, known, strict=True):
-        check_start(job, teacher)
+        check_alike(job, teacher)
         if not set(clips) & set(wanted):
             raise ConfigurationError(
                 f"the policy to imitate was trained on {', '.join(clips)}, none of which is "
@@ -168,17 +172,16 @@ def check_resumed(job: Job, start: Policy) -> None:
 
 def check_start(job: Job, start: Policy) -> None:
     """Raise ConfigurationError if a job cannot begin with a policy."""
-    rate, hold = job.settings.parameters.rate_hz, start.hold
-    for name, found, wanted in (
-        ("rate", start.rate_hz, rate),
-        ("hold", hold, hold_ticks(rate)),
-        ("hidden layer", len(start.network.bias_1), HIDDEN),
-        ("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist()),
-    ):
-        if found != wanted:
-            raise ConfigurationError(
-                f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
-            )
+    check_alike(job, start)
+    _check_equal("hidden layer", len(start.network.bias_1), job.hidden)
+
+
+def check_alike(job: Job, start: Policy) -> None:
+    """Raise ConfigurationError if a policy is not told, or does not answer, as that of a job."""
+    rate = job.settings.parameters.rate_hz
+    _check_equal("rate", start.rate_hz, rate)
+    _check_equal("hold", start.hold, hold_ticks(rate))
+    _check_equal("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist())
     for name, given, own in (
         ("sigma", start.unit, action_unit(job.settings)),
         ("stiffness", start.stiffness[6:], job.gains.stiffness[6:]),  # no force acts on the root
@@ -188,3 +191,10 @@ def check_start(job: Job, start: Policy) -> None:
             raise ConfigurationError(
                 f"the policy was trained with another {name}; it must be the same"
             )
+
+
+def _check_equal(name: str, found: object, wanted: object) -> None:
+    if found != wanted:
+        raise ConfigurationError(
+            f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
+        )

@@ -17,7 +17,7 @@ from controller_node.planner.compiled.observation import ObservationScales
 from controller_node.planner.policy.file import Policy
 from msgs_config.arrays import IntArray, SingleArray
 
-_ALONE_UNTIL, _HEARD_UNTIL = 0.4, 0.8  # shares of a training
+_ALONE_UNTIL, _HEARD_UNTIL = 0.6, 1.0  # shares of a training
 
 
 def heard(course: float) -> float:

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from actuated_characters.training.episode_types import CUT, FELL, Taught, Trace
-from actuated_characters.training.job import HIDDEN, Job, decisions_of
+from actuated_characters.training.job import Job, decisions_of
 from actuated_characters.training.learner import Learner, LearningSettings, copy_of
 from actuated_characters.training.references import make_scales, make_table
 from actuated_characters.training.teachers import Teachers, heard
@@ -20,6 +20,7 @@ from msgs_config.arrays import FloatArray
 _WORLDS, _DECISIONS = 64, 48  # of a trace
 _SPREADS = (1.0, 0.3)  # standard deviation of what is tried, at first and in the end
 _RATES = (1.2e-3, 2e-4)  # of a policy's steps, at first and in the end
+_TAUGHT_RATE = 1e-3  # the same while teachers are heard alone: what they say does not scatter
 _FROM = 0.5  # of that course, from where on it goes where it has what other policies can
 _LEAST_PUSH = 5.0  # N s, up to which pushes are at first
 _RARE, _OFTEN = 0.2, 0.4  # falls a second, below which pushes grow and above which they shrink
@@ -96,7 +97,7 @@ class Training:
         traces = job.decisions / (_WORLDS * _DECISIONS)
         averaged = max(round(_AVERAGED * traces), 1)
         settings = LearningSettings(largest=LARGEST_ACTION, averaged=averaged)
-        self._learner = Learner((inputs, HIDDEN, len(rules.unit)), learning, settings)
+        self._learner = Learner((inputs, job.hidden, len(rules.unit)), learning, settings)
         self._push, self._falls = _LEAST_PUSH, _OFTEN
         self._looked = self._done * _LOOKS // job.decisions
         self._lengths: list[float] = []
@@ -174,13 +175,17 @@ class Training:
         if self._from is not None or self._imitated:
             share = _FROM + (1.0 - _FROM) * share
         spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
-        return spread, rate
+        return spread, rate + self._heard * max(_TAUGHT_RATE - rate, 0.0)
+
+    @property
+    def _heard(self) -> float:
+        """How much teachers count now."""
+        return heard(self._done / self._job.decisions) if self._imitated else 0.0
 
     def _taught(self, trace: Trace) -> Taught | None:
         """What teachers would have done in a trace."""
         observations = trace.observations.reshape(trace.rewards.size, -1)
-        share = heard(self._done / self._job.decisions)
-        return self._teachers.answer(observations, trace.rows.ravel(), share)
+        return self._teachers.answer(observations, trace.rows.ravel(), self._heard)
 
     def _lead_pushes(self, trace: Trace) -> None:
         falls = float((trace.ends == FELL).mean()) / self._decision_s

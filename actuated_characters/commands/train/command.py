@@ -78,6 +78,14 @@ def _add_what(command: argparse.ArgumentParser) -> None:
         help="impulse, in N s, of the hardest pushes that it learns to take; 0: none (%(default)g)",
     )
 
+    command.add_argument(
+        "--hidden",
+        type=int,
+        default=128,
+        metavar="N",
+        help="units of each of the network's two layers; many clips need more (%(default)d)",
+    )
+
 
 def _add_how(command: argparse.ArgumentParser) -> None:
     """Add where it begins, with what, and where the result goes."""

@@ -74,7 +74,7 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
     threads = options.threads if options.threads is not None else len(os.sched_getaffinity(0))
     for name, value, least in (
         *(("--minutes", options.minutes, 0.01), ("--pushes", options.pushes, 0.0)),
-        *(("--threads", threads, 1), ("--seed", options.seed, 0)),
+        *(("--threads", threads, 1), ("--seed", options.seed, 0), ("--hidden", options.hidden, 1)),
     ):
         if not least <= value < math.inf:
             raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
@@ -86,6 +86,7 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
         seed=options.seed,
         threads=threads,
         after=options.after,
+        hidden=options.hidden,
     )
 
 

@@ -140,6 +140,7 @@ def _options(arguments: Sequence[str]) -> object:
         (["--pushes", "-1"], "--pushes is -1; it must be 0 or more"),
         (["--pushes", "inf"], "--pushes is inf"),
         (["--seed", "-1"], "--seed is -1; it must be 0 or more"),
+        (["--hidden", "0"], "--hidden is 0; it must be 1 or more"),
         (["--threads", "0"], "--threads is 0; it must be 1 or more"),
         (["--clip", "wlak"], "wlak"),
         (["--after", "wlak"], "wlak"),

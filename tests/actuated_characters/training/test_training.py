@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from actuated_characters.training import exercises
-from actuated_characters.training import job as job_module
 from actuated_characters.training import training as module
 from actuated_characters.training.episode_types import FELL, Trace
 from actuated_characters.training.exercises import Exercise
@@ -197,13 +196,12 @@ def test_clips_that_were_made_with_other_parameters_are_refused(
 
 
 def test_networks_of_another_size_are_refused(
-    begin: Callable[..., Training], monkeypatch: pytest.MonkeyPatch
+    begin: Callable[..., Training],
 ) -> None:
     policy = looked_at(begin()).best({})
-    monkeypatch.setattr(job_module, "HIDDEN", 32)
 
     with pytest.raises(ConfigurationError, match="hidden layer: 128, this training's: 32"):
-        check_start(JOB, policy)
+        check_start(replace(JOB, hidden=32), policy)
 
 
 @pytest.mark.parametrize(
