@@ -24,6 +24,7 @@ from tests.support.policies import write_random_policy
 from tests.support.training import HUMANOID, make_small
 
 FEW = ["--minutes", "0.01"]  # 64 decisions, see `small`
+OWN_CLIP = str(DATA / "walk_reconstructed.json")
 
 
 @pytest.fixture(autouse=True)
@@ -160,7 +161,7 @@ def _options(arguments: Sequence[str]) -> object:
         (["--from", "wlak"], "wlak"),
         (["--imitate", "wlak"], "wlak"),
         (["--imitate", "run"], "was trained on run, none of which is trained here: walk"),
-        (["--imitate", "--clip", "spin"], "--imitate: no policy of spin is shipped; name a file"),
+        (["--imitate", "--clip", OWN_CLIP], f"--imitate: no policy of {OWN_CLIP} is shipped; name"),
         (["--imitate", "--set", "controller_node.rate:=120"], "rate: 240, this training's: 120"),
         (["--from", "walk", "--character", "laikago"], "does not fit 'laikago'"),
         (["--set", "controller_node.planner:=none"], "controller_node.planner:=none"),
