@@ -54,6 +54,7 @@ class MetricsCollector:
         self._texts: set[str] = set()  # the texts of all configurations so far
         self._early: deque[tuple[str, bytes, int | None]] = deque()
         self._early_bytes = 0
+        self._states_too_early = 0  # of which the configuration came too late
         self._counts: dict[str, int | None] = dict.fromkeys(COUNTS.values())
         self._first_command_ns: int | None = None
         self._last_state_ns: int | None = 0
@@ -65,8 +66,10 @@ class MetricsCollector:
 
     @property
     def missing_ticks(self) -> int:
-        """Number of ticks before the last one whose state never came."""
-        return 0 if self._configuration is None else self._assembler.missing_ticks
+        """Number of ticks before the last one whose state never came, or could not be kept."""
+        if self._configuration is None:
+            return 0
+        return self._states_too_early + self._assembler.missing_ticks
 
     def take(self, topic: str, raw: bytes, published_ns: int | None) -> None:
         """Take a serialised message that was published at a wall time in ns; None if not known.
@@ -77,10 +80,7 @@ class MetricsCollector:
         if topic == CONFIGURATION:
             self._configure(decode_string(raw))
         elif self._configuration is None:
-            self._early.append((topic, raw, published_ns))
-            self._early_bytes += len(raw)
-            while len(self._early) > _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
-                self._early_bytes -= len(self._early.popleft()[1])
+            self._keep_early(topic, raw, published_ns)
         elif topic == topics.JOINT_TORQUES.name:
             self._first_command_ns = self._first_command_ns or published_ns
         elif topic == MODE:
@@ -103,10 +103,9 @@ class MetricsCollector:
         Raises:
             RecordingError: no simulator's configuration has come.
         """
-        if self._early and self._configuration is None:
-            raise RecordingError(f"nothing on '{CONFIGURATION}', which says what states mean")
         if self._configuration is None:
-            raise RecordingError("no simulator was heard")
+            nothing = f"nothing on '{CONFIGURATION}', which says what states mean"
+            raise RecordingError(nothing if self._early else "no simulator was heard")
         self._assembler.finish()
         metrics = self._measurement.summary(self._wall_time())
         losses = {
@@ -122,6 +121,14 @@ class MetricsCollector:
         if last_ns is None:
             return None
         return (last_ns - (self._first_command_ns or last_ns)) / NANOSECONDS_PER_SECOND
+
+    def _keep_early(self, topic: str, raw: bytes, published_ns: int | None) -> None:
+        self._early.append((topic, raw, published_ns))
+        self._early_bytes += len(raw)
+        while len(self._early) > _MOST_EARLY or self._early_bytes > _MOST_EARLY_BYTES:
+            topic, raw, _ = self._early.popleft()
+            self._early_bytes -= len(raw)
+            self._states_too_early += topic == topics.JOINT_STATES.name
 
     def _configure(self, text: str) -> None:
         if text in self._texts:  # a latched configuration may come again

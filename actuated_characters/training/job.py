@@ -97,15 +97,21 @@ def make_job(
 
 
 def taught_by(job: Job, teachers: Sequence[Policy]) -> Job:
-    """The same job with policies of single exercises, which its own imitates at first.
+    """The same job with policies that its own imitates at first, the first that knows an exercise.
 
     Raises:
-        ConfigurationError: one was trained otherwise, or knows none of the exercises.
+        ConfigurationError: one was trained or is steered otherwise, or knows none of the exercises.
     """
     known = [[Path(clip).stem for clip in each.about["clips"]] for each in teachers]
     wanted = [Path(name).stem for name in job.names]
     for teacher, clips in zip(teachers, known, strict=True):
-        check_alike(job, teacher)
+        check_alike(job, teacher, f"the policy of {', '.join(clips)}")
+        gait = tuple(teacher.about.get("gait", job.gait))
+        if job.gait and gait != job.gait:
+            raise ConfigurationError(
+                f"the policy to imitate was steered by {', '.join(gait)}; here it is by "
+                f"{', '.join(job.gait)}"
+            )
         if not set(clips) & set(wanted):
             raise ConfigurationError(
                 f"the policy to imitate was trained on {', '.join(clips)}, none of which is "
@@ -173,28 +179,24 @@ def check_resumed(job: Job, start: Policy) -> None:
 def check_start(job: Job, start: Policy) -> None:
     """Raise ConfigurationError if a job cannot begin with a policy."""
     check_alike(job, start)
-    _check_equal("hidden layer", len(start.network.bias_1), job.hidden)
+    _check_equal("the policy's --hidden", len(start.network.bias_1), job.hidden)
 
 
-def check_alike(job: Job, start: Policy) -> None:
+def check_alike(job: Job, start: Policy, what: str = "the policy") -> None:
     """Raise ConfigurationError if a policy is not told, or does not answer, as that of a job."""
     rate = job.settings.parameters.rate_hz
-    _check_equal("rate", start.rate_hz, rate)
-    _check_equal("hold", start.hold, hold_ticks(rate))
-    _check_equal("frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist())
+    _check_equal(f"{what}'s rate", start.rate_hz, rate)
+    _check_equal(f"{what}'s hold", start.hold, hold_ticks(rate))
+    _check_equal(f"{what}'s frames ahead", start.ahead.tolist(), frames_ahead(rate).tolist())
     for name, given, own in (
         ("sigma", start.unit, action_unit(job.settings)),
         ("stiffness", start.stiffness[6:], job.gains.stiffness[6:]),  # no force acts on the root
         ("damping", start.damping[6:], job.gains.damping[6:]),
     ):
         if not np.array_equal(given, own):
-            raise ConfigurationError(
-                f"the policy was trained with another {name}; it must be the same"
-            )
+            raise ConfigurationError(f"{what} was trained with another {name}; it must be the same")
 
 
 def _check_equal(name: str, found: object, wanted: object) -> None:
     if found != wanted:
-        raise ConfigurationError(
-            f"the policy's {name}: {found}, this training's: {wanted}; it must be the same"
-        )
+        raise ConfigurationError(f"{name}: {found}, this training's: {wanted}; it must be the same")

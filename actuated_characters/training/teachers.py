@@ -1,4 +1,4 @@
-"""What policies of single clips would do, for a policy of many clips to learn from.
+"""What other policies would do in their clips, for a policy of many clips to learn from.
 
 Sources: Ross et al. 2011, "A Reduction of Imitation Learning and Structured Prediction to No-Regret
 Online Learning": the pupil acts, and teachers say what they would have done in its states; Schmitt
@@ -27,7 +27,7 @@ def heard(course: float) -> float:
 
 
 class Teachers:
-    """Policies that know single references of a table."""
+    """Policies that know some references of a table."""
 
     def __init__(
         self,
@@ -50,11 +50,12 @@ class Teachers:
             return None
         references = np.searchsorted(self._firsts, rows, side="right") - 1
         actions = np.zeros((len(rows), self._size), np.float32)
+        shares = np.zeros(len(rows), np.float32)
         for reference, network in self._networks.items():
             own = references == reference
             actions[own] = forward(network, observations[own])[0]
-        shares = np.where(np.isin(references, list(self._networks)), share, 0.0)
-        return Taught(actions, shares.astype(np.float32))
+            shares[own] = share
+        return Taught(actions, shares)
 
 
 def _seen_through(policy: Policy, scales: ObservationScales) -> Network:

@@ -90,6 +90,10 @@ class Training:
         self._imitated = [
             name for name, each in zip(job.names, job.teachers, strict=False) if each is not None
         ]
+        self._most_heard = 1.0
+        if start is not None and resumes:  # what was learnt without teachers is not to be undone
+            self._imitated = start.about["trained"].get("imitated", self._imitated)
+            self._most_heard = start.about["trained"].get("heard", 1.0)
         self._teachers = Teachers(job.teachers, self._starts, self._scales)
         rules = self._worlds.rules
         self._decision_s = rules.hold * rules.period
@@ -175,12 +179,14 @@ class Training:
         if self._from is not None or self._imitated:
             share = _FROM + (1.0 - _FROM) * share
         spread, rate = (first * (last / first) ** share for first, last in (_SPREADS, _RATES))
-        return spread, rate + self._heard * max(_TAUGHT_RATE - rate, 0.0)
+        return spread, rate + self._heard * (_TAUGHT_RATE - rate)
 
     @property
     def _heard(self) -> float:
         """How much teachers count now."""
-        return heard(self._done / self._job.decisions) if self._imitated else 0.0
+        if not any(self._job.teachers):
+            return 0.0
+        return min(heard(self._done / self._job.decisions), self._most_heard)
 
     def _taught(self, trace: Trace) -> Taught | None:
         """What teachers would have done in a trace."""
@@ -231,7 +237,7 @@ class Training:
             "pushes_ns": round(min(self._push, job.most_push), 1),
             **({"after": list(job.after)} if job.after else {}),
             **({} if self._from is None else {"from": self._from}),
-            **({"imitated": self._imitated} if self._imitated else {}),
+            **({"imitated": self._imitated, "heard": self._heard} if self._imitated else {}),
         }
         return copy_of(policy), copy_of(value), trained, calm
 

@@ -35,6 +35,7 @@ def add_train(commands: "Commands[argparse.ArgumentParser]") -> None:
     )
     add_character(command)
     _add_what(command)
+    _add_network(command)
     _add_how(command)
 
 
@@ -78,17 +79,9 @@ def _add_what(command: argparse.ArgumentParser) -> None:
         help="impulse, in N s, of the hardest pushes that it learns to take; 0: none (%(default)g)",
     )
 
-    command.add_argument(
-        "--hidden",
-        type=int,
-        default=128,
-        metavar="N",
-        help="units of each of the network's two layers; many clips need more (%(default)d)",
-    )
-
 
 def _add_how(command: argparse.ArgumentParser) -> None:
-    """Add where it begins, with what, and where the result goes."""
+    """Add how it is computed, and where the result goes."""
     command.add_argument("--seed", type=int, default=0, help="of all random numbers (0)")
     command.add_argument(
         "--output",
@@ -97,6 +90,20 @@ def _add_how(command: argparse.ArgumentParser) -> None:
         help=f"the policy ({FOLDER}/CHARACTER-CLIP{SUFFIX})",
     )
     command.add_argument("--overwrite", action="store_true", help="replace FILE")
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="controller_node.NAME:=VALUE",
+        help="a parameter, such as rate, gains or plan.weight; may be repeated",
+    )
+    command.add_argument(
+        "--threads", type=int, metavar="N", help="of the worlds (one for each processor)"
+    )
+
+
+def _add_network(command: argparse.ArgumentParser) -> None:
+    """Add what network learns, and from whom."""
     start = command.add_mutually_exclusive_group()
     start.add_argument(
         "--resume", action="store_true", help="go on with the training in FILE, if there is one"
@@ -108,20 +115,17 @@ def _add_how(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--imitate",
+        action="extend",
         nargs="*",
         metavar="POLICY",
         help="learn from what other policies, each of some of the clips, would have done, at first "
         "from that alone (those that are shipped)",
     )
     command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="controller_node.NAME:=VALUE",
-        help="a parameter, such as rate, gains or plan.weight; may be repeated",
-    )
-    command.add_argument(
-        "--threads", type=int, metavar="N", help="of the worlds (one for each processor)"
+        "--hidden",
+        type=int,
+        metavar="N",
+        help="units of each of the network's two layers; many clips need more (128)",
     )
 
 

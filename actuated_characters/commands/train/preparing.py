@@ -11,7 +11,14 @@ from actuated_characters.commands.common.result_file import check_not_lost, resu
 from actuated_characters.commands.common.settings import node_settings
 from actuated_characters.commands.train.command import DECISIONS_A_MINUTE, FOLDER, SUFFIX
 from actuated_characters.training.exercises import Exercise
-from actuated_characters.training.job import Job, check_resumed, check_start, make_job, taught_by
+from actuated_characters.training.job import (
+    HIDDEN,
+    Job,
+    check_resumed,
+    check_start,
+    make_job,
+    taught_by,
+)
 from controller_node.planner.policy.file import STEERED, Policy, read_policy, shipped_policies
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import expand_clips
@@ -72,9 +79,10 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
     """What the options say; raises ActuatedCharactersError if it cannot be trained."""
     given = given_parameters(options)
     threads = options.threads if options.threads is not None else len(os.sched_getaffinity(0))
+    hidden = HIDDEN if options.hidden is None else options.hidden
     for name, value, least in (
         *(("--minutes", options.minutes, 0.01), ("--pushes", options.pushes, 0.0)),
-        *(("--threads", threads, 1), ("--seed", options.seed, 0), ("--hidden", options.hidden, 1)),
+        *(("--threads", threads, 1), ("--seed", options.seed, 0), ("--hidden", hidden, 2)),
     ):
         if not least <= value < math.inf:
             raise ConfigurationError(f"{name} is {value:g}; it must be {least:g} or more")
@@ -86,7 +94,7 @@ def job_of(options: argparse.Namespace, exercises: Sequence[Exercise]) -> Job:
         seed=options.seed,
         threads=threads,
         after=options.after,
-        hidden=options.hidden,
+        hidden=hidden,
     )
 
 
@@ -104,7 +112,11 @@ def taught(options: argparse.Namespace, job: Job) -> Job:
         raise ConfigurationError(
             f"--imitate: no policy of {', '.join(job.names)} is shipped; name a file"
         )
-    return taught_by(job, [read_policy(name, job.character) for name in names])
+    job = taught_by(job, [read_policy(name, job.character) for name in names])
+    alone = [name for name, each in zip(job.names, job.teachers, strict=True) if each is None]
+    if alone:
+        say(f"nobody to imitate knows {', '.join(alone)}, learned from its reward alone")
+    return job
 
 
 def start_of(options: argparse.Namespace, job: Job, output: Path) -> Policy | None:

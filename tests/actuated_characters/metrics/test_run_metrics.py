@@ -12,6 +12,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 
+from actuated_characters.metrics import collector as collector_module
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.metrics.error_measures import is_lost
 from actuated_characters.metrics.run_metrics import COLUMNS, Measurement, Tick
@@ -519,6 +520,17 @@ def test_however_late_a_configuration_comes_the_newest_messages_are_measured() -
 
     for early in many, large:
         assert heard([*early, *messages[:30], configured, *messages[30:]]).results()[0] == metrics
+
+
+def test_states_that_could_not_be_kept_until_a_configuration_are_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    messages = [each for each in pendulum_messages() if each[0] == STATE]
+    monkeypatch.setattr(collector_module, "_MOST_EARLY", len(messages) - 3)
+
+    collector = heard([*messages, configuration_message()])
+
+    assert collector.missing_ticks == collector.results()[0]["missing_ticks"] == 3
 
 
 def test_without_a_configuration_there_are_no_figures() -> None:

@@ -13,8 +13,9 @@ from actuated_characters.training.starts import StartRange
 from actuated_characters.training.teachers import Teachers, heard
 from actuated_characters.training.training import Training
 from controller_node.planner.compiled.observation import ObservationScales
-from controller_node.planner.policy.file import Policy, read_policy
-from tests.support.training import HUMANOID, arrays_of, make_small, walking_job
+from controller_node.planner.policy.file import read_policy
+from msgs_config.errors import ConfigurationError
+from tests.support.training import HUMANOID, make_small, walking_job
 
 WALK, RUN = (read_policy(name, HUMANOID) for name in ("walk", "run"))
 RANGES = [StartRange(0, 10, wraps=True), StartRange(50, 20, wraps=False)]
@@ -147,16 +148,51 @@ def test_a_training_has_its_pupil_taught(monkeypatch: pytest.MonkeyPatch) -> Non
     assert alone == without != taught
 
 
-def test_a_policy_says_whom_it_imitated(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_policy_says_whom_it_imitated_and_how_wide_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     make_small(monkeypatch)
-    clips = [Exercise("humanoid", name) for name in ("walk", "spin")]
-    training = Training(taught_by(make_job(clips, {}, decisions=64), [RUN, WALK][1:]))
+    clips = [Exercise("humanoid", name) for name in ("walk", "spin", "run")]
+    job = taught_by(make_job(clips, {}, decisions=64, hidden=24), [RUN, WALK])
+    training = Training(job)
     training.go_on()
     training._look()
     training.close()
 
     policy = training.best({})
 
-    assert policy.about["trained"]["imitated"] == ["walk"]
-    assert arrays_of(policy)
-    assert isinstance(policy, Policy)
+    assert [each and each.about["clips"] for each in job.teachers] == [["walk"], None, ["run"]]
+    assert policy.about["trained"]["imitated"] == ["walk", "run"]
+    assert policy.network.weights_2.shape == (24, 24)
+
+
+def test_what_was_learnt_alone_is_not_imitated_away_where_a_training_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    make_small(monkeypatch)
+    job = taught_by(walking_job(), [WALK])
+    first = Training(job)
+    while not first.is_over:
+        first.go_on()
+    first.close()
+
+    longer = replace(job, decisions=100 * job.decisions)
+    resumed = Training(longer, first.best({}), resumes=True)
+    alone = Training(replace(longer, teachers=()), first.best({}), resumes=True)
+    for each in (resumed, alone):
+        each.close()
+
+    assert first.best({}).about["trained"]["heard"] < 1.0
+    assert resumed._heard == first.best({}).about["trained"]["heard"]
+    assert alone._heard == 0.0
+    assert alone.best({}).about["trained"]["imitated"] == ["walk"]
+    assert alone._spread_and_rate()[0] == resumed._spread_and_rate()[0]
+
+
+def test_a_policy_that_is_steered_otherwise_is_not_imitated() -> None:
+    steered = read_policy("steered", HUMANOID)
+    job = replace(walking_job(), names=("steered",), gait=("run", "walk"))
+
+    assert taught_by(job, [steered]).teachers == (steered,)
+    with pytest.raises(ConfigurationError, match="was steered by run, walk; here it is by crawl"):
+        taught_by(replace(job, gait=("crawl",)), [steered])

@@ -200,7 +200,7 @@ def test_networks_of_another_size_are_refused(
 ) -> None:
     policy = looked_at(begin()).best({})
 
-    with pytest.raises(ConfigurationError, match="hidden layer: 128, this training's: 32"):
+    with pytest.raises(ConfigurationError, match="--hidden: 128, this training's: 32"):
         check_start(replace(JOB, hidden=32), policy)
 
 
