@@ -17,13 +17,16 @@ from controller_node.planner.compiled.observation import ObservationScales
 from controller_node.planner.policy.file import Policy
 from msgs_config.arrays import IntArray, SingleArray
 
-_ALONE_UNTIL, _HEARD_UNTIL = 0.6, 1.0  # shares of a training
+_ALONE_UNTIL, _LEAST = 0.6, 0.2  # share of a training; of what counts, at its end
 
 
 def heard(course: float) -> float:
-    """How much teachers count, by how far a training is: all at first, then less and less."""
-    left = (_HEARD_UNTIL - course) / (_HEARD_UNTIL - _ALONE_UNTIL)
-    return float(np.clip(left, 0.0, 1.0))
+    """How much teachers count, by how far a training is: all at first, then less and less.
+
+    Where they no longer counted, falls became more frequent again.
+    """
+    left = max(1.0 - course, 0.0) / (1.0 - _ALONE_UNTIL)
+    return _LEAST + (1.0 - _LEAST) * min(left, 1.0)
 
 
 class Teachers:
