@@ -48,8 +48,8 @@ class Teachers:
         self._firsts = np.array([each.first for each in starts])
 
     def answer(self, observations: SingleArray, rows: IntArray, share: float) -> Taught | None:
-        """What they say to observations (m, o) at rows (m,) of the table; None if nobody counts."""
-        if share == 0.0 or not self._networks:
+        """What they say to observations (m, o) at rows (m,) of the table; None if there is nobody."""
+        if not self._networks:
             return None
         references = np.searchsorted(self._firsts, rows, side="right") - 1
         actions = np.zeros((len(rows), self._size), np.float32)

@@ -67,11 +67,10 @@ def test_each_teacher_speaks_of_its_own_reference_alone() -> None:
     np.testing.assert_allclose(taught.actions[[1, 3]], alone.actions[[1, 3]], atol=1e-6)
 
 
-def test_without_a_teacher_and_without_a_share_nothing_is_said() -> None:
+def test_without_a_teacher_nothing_is_said() -> None:
     rows, observations = np.zeros(4, np.intp), observed(WALK.scales, 4)
 
     assert Teachers([None], RANGES, WALK.scales).answer(observations, rows, 1.0) is None
-    assert Teachers([WALK], RANGES, WALK.scales).answer(observations, rows, 0.0) is None
 
 
 def test_they_are_heard_alone_at_first_then_less_and_less() -> None:
