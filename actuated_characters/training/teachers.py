@@ -48,7 +48,7 @@ class Teachers:
         self._firsts = np.array([each.first for each in starts])
 
     def answer(self, observations: SingleArray, rows: IntArray, share: float) -> Taught | None:
-        """What they say to observations (m, o) at rows (m,) of the table; None if there is nobody."""
+        """What they say to observations (m, o) at rows (m,) of the table; None without any."""
         if not self._networks:
             return None
         references = np.searchsorted(self._firsts, rows, side="right") - 1
