@@ -35,11 +35,22 @@ class WorkerProcesses:
         if kind not in (None, GeneratorExit):  # nobody waits for what they are at
             for process in multiprocessing.active_children():
                 process.terminate()
+            self._end_results()
         self.close()
 
     def close(self) -> None:
         """End the processes, each after the task that it is at."""
         self._pool.shutdown(cancel_futures=True)
+
+    def _end_results(self) -> None:
+        """Have whoever reads results find their end, where a process was ended amid writing one.
+
+        This process has the pipe's other end as well, to hand it to more processes; while it is
+        open, the pool would wait for the rest for ever (seen in Python 3.11).
+        """
+        results = getattr(self._pool, "_result_queue", None)
+        if results is not None:
+            results._writer.close()
 
     def submit(self, task: Callable[P, T], *given: P.args, **named: P.kwargs) -> Future[T]:
         """Begin a task, and more processes if there are too few."""

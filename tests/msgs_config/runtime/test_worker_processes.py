@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +15,28 @@ from msgs_config.runtime.worker_processes import WorkerProcesses
 
 PROJECT = Path(__file__).parents[3]
 MUCH = 1_000_000  # more bytes than a pipe takes: what feeds the processes stands still
+ROUNDS = 5  # in one of two a process is ended amid writing a result
 
 
 def test_an_interrupt_with_much_still_waiting_ends_without_a_word() -> None:
-    ended = subprocess.run(
-        (sys.executable, "-m", __name__),
+    ended = run_here("waiting")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
+
+
+def test_an_error_amid_the_results_ends_at_once() -> None:
+    ended = run_here("writing")
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "ended\n" * ROUNDS, "")
+
+
+def run_here(what: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        (sys.executable, "-m", __name__, what),
         cwd=PROJECT,
         capture_output=True,
         text=True,
         timeout=120.0,
         check=False,
     )
-    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
 
 
 def begin() -> None:
@@ -44,7 +55,22 @@ def interrupted(pool: WorkerProcesses) -> None:
         threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
 
 
+def large(number: int) -> np.ndarray:
+    return np.full(30 * MUCH, number, np.uint8)  # to be written takes longer than to be made
+
+
+def end_amid_results() -> None:
+    with suppress(ArithmeticError), WorkerProcesses(2, begin) as pool:
+        for _ in pool.map(large, range(9)):
+            raise ArithmeticError
+    print("ended", flush=True)
+
+
 def main() -> None:
+    if sys.argv[1:] == ["writing"]:
+        for _ in range(ROUNDS):
+            end_amid_results()
+        return
     try:
         with WorkerProcesses(2, begin) as pool:
             asked_first = pool.submit(slow, np.ones(1))
