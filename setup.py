@@ -51,6 +51,7 @@ setup(
     # beside them, and a requirement that is not met stops a program that imports pkg_resources.
     install_requires=[
         "lz4>=4.0,<5",  # which rosbags needs as well
+        "manifold3d>=3.1,<4",  # closed surfaces of skins (4 MB, Apache-2.0)
         "matplotlib>=3.6,<4",
         "mcap>=1.6,<2",  # writes bags, and reads files that were never closed
         # What each tick computes is compiled by numba (210 MB with llvmlite, BSD-2; 0.3 s more CPU

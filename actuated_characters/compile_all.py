@@ -22,7 +22,7 @@ def main() -> None:
         for planner in (predictive, {"planner": "policy"}):
             plan = make_plan("humanoid", 0.05, clip, simulator, planner)
             *_, last = ticks_in_process(plan)
-    Renderer(plan.character).picture(FrameSpec(last.following.position), _SIZE)
+    Renderer(plan.character, skinned=True).picture(FrameSpec(last.following.position), _SIZE)
     with Batch(plan.character, 1, threads=1, clip="walk") as batch:
         batch.step()
 

@@ -49,6 +49,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "over it, where it really is, or not at all (the strip's default)",
     )
     add("--reference", action="store_true", help="the same as --ghost over")
+    add("--shapes", action="store_true", help="the shapes themselves, not the skin around them")
     add("--size", metavar="WxH", help="pixels of a picture (strip: as suits; movie: 960x540)")
     add = render.add_argument_group("strip").add_argument
     add("--times", metavar="S,S,...", help="when, in s since the run's first state")
@@ -115,6 +116,7 @@ def _render_strip(options: argparse.Namespace) -> None:
             columns=options.columns,
             ghost=options.reference or options.ghost == "over",
             size=size,
+            skinned=not options.shapes,
             progress=lambda done: bar.update(bar.task_ids[0], completed=done),
         )
     save_png(picture, output)
@@ -136,6 +138,7 @@ def _render_movie(options: argparse.Namespace) -> None:
         size=size or MOVIE_SIZE,
         ghost=None if ghost is None else GhostPlace(ghost),
         contacts=options.contacts,
+        skinned=not options.shapes,
         workers=options.workers,
     )
     check_video(settings.size, settings.fps)

@@ -24,10 +24,13 @@ class SceneSettings:
     terrain: UrdfOptions | None
     size: Size
     write: Callable[[Picture, str], Picture]  # adds a caption
+    skinned: bool = True  # draw skins in place of the shapes that they are made from
 
     def renderer(self) -> Renderer:
         """Make what draws it."""
-        return Renderer(self.characters, ground=self.ground, terrain=self.terrain)
+        return Renderer(
+            self.characters, ground=self.ground, terrain=self.terrain, skinned=self.skinned
+        )
 
 
 def draw(

@@ -64,6 +64,7 @@ class MovieSettings:
     size: Size = MOVIE_SIZE
     ghost: GhostPlace | None = None  # None: beside if there is a reference
     contacts: bool = False  # mark the links that touch something
+    skinned: bool = True  # draw a smooth skin in place of plain shapes
     workers: int | None = None  # processes that draw; None: as many as there are cores
 
 
@@ -114,7 +115,12 @@ class Movie:
         if most is None:
             most = min(len(os.sched_getaffinity(0)), ceil(len(self) / _PICTURES_A_WORKER))
         stays = SceneSettings(
-            scene.characters, scene.ground, scene.terrain, self._settings.size, write_on
+            scene.characters,
+            scene.ground,
+            scene.terrain,
+            self._settings.size,
+            write_on,
+            self._settings.skinned,
         )
         return draw(stays, self._frames, most)
 

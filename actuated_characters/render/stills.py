@@ -53,6 +53,7 @@ def strip(
     ghost: bool = False,
     labels: bool = True,
     size: Size | None = None,
+    skinned: bool = True,
     progress: Progress | None = None,
 ) -> Picture:
     """Pictures of a run side by side, all of one scale; each follows the root along the ground.
@@ -68,6 +69,7 @@ def strip(
         ghost: Draw the reference, too, transparent, wherever there is one.
         labels: Write the time above each picture.
         size: Width and height of each picture in pixels.
+        skinned: Draw a smooth skin in place of plain shapes (`Renderer`).
         progress: Is called after each picture.
 
     Raises:
@@ -81,7 +83,7 @@ def strip(
     captions = [f"{time:.2f} s" if labels else "" for time in scene.times[rows]]
     frames = scene.frames(rows, captions, ghosts=ghost)
     world = WorldSettings(ground=scene.ground, terrain=scene.terrain)
-    return _draw_strip(scene.characters, world, frames, columns, size, progress)
+    return _draw_strip(scene.characters, world, frames, columns, size, skinned, progress)
 
 
 def pose_strip(
@@ -128,6 +130,7 @@ def _draw_strip(
     frames: Sequence[FrameSpec],
     columns: int | None,
     size: Size | None,
+    skinned: bool = True,
     progress: Progress | None = None,
 ) -> Picture:
     """The strip of some frames, which have no views yet."""
@@ -135,7 +138,7 @@ def _draw_strip(
     if not count or (columns is not None and columns < 1):
         raise ConfigurationError(f"{count} pictures in rows of {columns}; both must be 1 or more")
     size, frames = _with_views(characters, frames, size)
-    settings = SceneSettings(characters, world.ground, world.terrain, size, captioned)
+    settings = SceneSettings(characters, world.ground, world.terrain, size, captioned, skinned)
     tiles: list[Picture] = []
     for picture in draw(settings, frames):
         tiles.append(picture)

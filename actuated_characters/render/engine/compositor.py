@@ -28,6 +28,8 @@ Picture: TypeAlias = NDArray[np.uint8]
 
 _SHADOW = 0.72  # share of the ground's brightness that a shadow leaves
 _SHADOW_SIZE = (384, 384)  # pixels of the picture from the light
+_LINE_OPACITY, _FILL_OPACITY = 0.85, 0.2  # of an outline, and of what is within it beside bodies
+_LINE_SHARE = 1.0 / 350.0  # width of a line, of the picture's height
 
 
 class Compositor:
@@ -48,6 +50,7 @@ class Compositor:
         self._colors: Samples = np.broadcast_to(ground.BACKGROUND, (height, width, 3)).copy()
         # for each sample, the distance of what is solid from the camera along its axis, m
         self._depth = np.full((height * samples, width * samples), np.inf, dtype=np.float32)
+        self._is_body = np.zeros(self._depth.shape, dtype=np.bool_)
         if has_ground:
             self._colors = ground.colors(view, size)
             rows = np.arange(0.5, height * samples)
@@ -89,6 +92,7 @@ class Compositor:
         if share.max(initial=0.0, where=seen) > 0.0:
             paint += (seen * share)[:, :, np.newaxis] * (ground.BACKGROUND - paint)
         np.minimum(solid, drawing.depth, out=solid)
+        self._is_body[fine.part] |= seen
         self._lay(box, paint, (~seen).astype(np.float32))
 
     def draw_over(
@@ -105,6 +109,23 @@ class Compositor:
         seen = drawing.depth < self._depth[fine.part]
         share = np.where(seen, opacity, hidden * np.isfinite(drawing.depth)).astype(np.float32)
         self._lay(box, share[:, :, np.newaxis] * drawing.color, 1.0 - share)
+
+    def draw_outline(self, scene: RenderScene, box: PixelRegion, color: Samples) -> None:
+        """Draw the outline of what a scene has in a part of the picture, also over bodies.
+
+        It is filled faintly where no body is, so that it muddies no colour of theirs. `color` is
+        red, green and blue (3,), 0 to 255.
+        """
+        if not box:
+            return
+        fine = box.times(self._samples)
+        drawing = scene.draw(self._view, self._fine_size, fine)
+        within = np.isfinite(drawing.depth)
+        width = max(_LINE_SHARE * self._size[1], 1.0)
+        line = within & ~_eroded(within, round(width * self._samples))
+        fills = (drawing.depth < self._depth[fine.part]) & ~self._is_body[fine.part]
+        share = np.where(line, _LINE_OPACITY, _FILL_OPACITY * fills).astype(np.float32)
+        self._lay(box, share[:, :, np.newaxis] * color, 1.0 - share)
 
     def _lay(self, box: PixelRegion, paint: Samples, clear: Samples) -> None:
         """Lay samples over a part of the picture.
@@ -138,3 +159,12 @@ class Compositor:
         share = np.zeros((box.bottom - box.top, box.right - box.left), dtype=np.float32)
         add_shadow(dark, np.vstack((places, seen[2])), (fine.top, fine.left), self._samples, share)
         return share
+
+
+def _eroded(within: BoolArray, reach: int) -> BoolArray:
+    """What (h, w) of a region is farther than so many samples from its border, along the axes."""
+    left = within
+    for _ in range(reach):
+        padded = np.pad(left, 1, mode="edge")
+        left = left & padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    return left

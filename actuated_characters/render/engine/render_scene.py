@@ -15,10 +15,12 @@ from actuated_characters.render.engine.shape_meshes import (
     textured_surface_of,
 )
 from actuated_characters.render.engine.surfaces import arrow_surface
+from actuated_characters.render.skin.skin import PosedSkin
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.geometry import fixed_order, rotations
+from msgs_config.geometry.surface import Surface
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
@@ -67,17 +69,29 @@ class _Skins(NamedTuple):
         )
 
 
+class Skinned(NamedTuple):
+    """The skin of one character among several."""
+
+    skin: PosedSkin
+    colors: list[Quadruple]  # of its links
+    links: slice  # which of all links are its own
+
+
 class RenderScene:
     """The links of characters and a terrain, balls and arrows, each of them shown or not."""
 
     def __init__(
-        self, links: Sequence[tuple[Shape, ...]], terrain: UrdfOptions | None = None
+        self,
+        links: Sequence[tuple[Shape, ...]],
+        terrain: UrdfOptions | None = None,
+        skins: Sequence[Skinned] = (),
     ) -> None:
-        """Make the surfaces of the shapes of each link.
+        """Make the surfaces of the shapes of each link, but for those that skins are drawn of.
 
         Raises:
             CharacterError: a mesh cannot be used, or the terrain's URDF.
         """
+        self._skins = skins
         self._links = _Skins.of([shape for shapes in links for shape in shapes])
         self._rows = np.repeat(np.arange(len(links)), [len(shapes) for shapes in links])
         self._terrain = _Skins.of([] if terrain is None else terrain_shapes(terrain))
@@ -98,6 +112,20 @@ class RenderScene:
             color = colors[row] or skins.colors[number]
             skin, place = skins.surfaces[number], places[number]
             self._shown.append(_Body(skin, color, place, axes[number], _CASTS_SHADOW))
+        for skinned in self._skins:
+            self._show_skin(skinned, frames, colors)
+
+    def _show_skin(
+        self, skinned: Skinned, frames: Frames, colors: Sequence[Quadruple | None]
+    ) -> None:
+        origins, turns_xyzw = (each[skinned.links] for each in frames)
+        if not np.isfinite(origins).all():
+            return
+        own = zip(colors[skinned.links], skinned.colors, strict=True)
+        chosen = [given or color for given, color in own]
+        for surface, color in skinned.skin.parts(origins, turns_xyzw, chosen):
+            body = _Body(_untextured(surface), color, np.zeros(3), np.eye(3), _CASTS_SHADOW)
+            self._shown.append(body)
 
     def show_terrain(self) -> None:
         """Show the terrain, if there is one."""
@@ -115,9 +143,8 @@ class RenderScene:
         """Show arrows, none of length zero: tail and tip (2, 3); their shafts' radius; m."""
         for tail, tip in arrows:
             surface = arrow_surface(float(fixed_order.norm(tip - tail)), radius)
-            skin = TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)
             axes = rotations.matrix(rotations.from_z(tip - tail))
-            self._shown.append(_Body(skin, _ARROW_COLOR, tail, axes, _SEEN))
+            self._shown.append(_Body(_untextured(surface), _ARROW_COLOR, tail, axes, _SEEN))
 
     def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
@@ -151,3 +178,7 @@ class RenderScene:
         with np.errstate(divide="ignore"):
             depth: Samples = np.float32(1.0) / inverses
         return Drawing(color, depth, marks == _CASTS_SHADOW)
+
+
+def _untextured(surface: Surface) -> TexturedSurface:
+    return TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)

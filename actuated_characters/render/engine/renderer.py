@@ -13,8 +13,10 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.compositor import Compositor, Picture
 from actuated_characters.render.engine.posed_characters import Frames, LinkForce, PosedCharacters
-from actuated_characters.render.engine.render_scene import RenderScene
+from actuated_characters.render.engine.render_scene import RenderScene, Skinned
 from actuated_characters.render.engine.surfaces import HEAD_WIDTH
+from actuated_characters.render.skin.palette import skin_colors
+from actuated_characters.render.skin.skin import PosedSkin
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character, UrdfOptions, Vector
 from msgs_config.geometry import fixed_order
@@ -26,6 +28,7 @@ _NO_BALLS = np.zeros((0, 4))
 
 _MOST_DRAWN = 2**23  # samples of a picture; each takes some 40 bytes, and more while it is drawn
 _GHOST_COLOR, _GHOST_OPACITY = (0.25, 0.85, 0.45, 1.0), 0.45
+_OUTLINE_COLOR = np.array((20.0, 150.0, 70.0), dtype=np.float32)
 _MARK_COLOR = (0.55, 0.15, 0.75, 1.0)
 _ARROW_RADIUS, _HIDDEN_ARROW_OPACITY = 0.005, 0.55  # share of the view's distance, opacity
 
@@ -59,6 +62,7 @@ class Renderer:
         ground: bool = True,
         terrain: UrdfOptions | None = None,
         samples: int = 2,
+        skinned: bool = False,
     ) -> None:
         """Make the surfaces of all that may be seen.
 
@@ -68,6 +72,9 @@ class Renderer:
             terrain: What else stays there.
             samples: Drawn along each edge of a pixel, for smooth edges; one where a picture is so
                 large that more would take gigabytes.
+            skinned: Draw a smooth skin in place of the shapes that it is made from, where a
+                character has a floating base and none of its shapes is a mesh; and ghosts that
+                are where they really are as outlines, not transparent.
 
         Raises:
             CharacterError: a file of a character or of the terrain cannot be used.
@@ -77,7 +84,12 @@ class Renderer:
         self.posed = PosedCharacters(characters)
         self._has_ground = ground and self.posed.stand_on_ground()
         self._has_terrain = terrain is not None
-        self._scene = RenderScene(self.posed.shapes, terrain)
+        self._skinned = skinned
+        skins = make_skins(characters) if skinned else []
+        shapes = list(self.posed.shapes)
+        for skin in skins:
+            shapes[skin.links] = [() for _ in skin.colors]
+        self._scene = RenderScene(shapes, terrain, skins)
 
     def picture(self, frame: FrameSpec, size: Size) -> Picture:
         """A picture (h, w, 3) of a width and a height in pixels."""
@@ -92,7 +104,10 @@ class Renderer:
             self._scene.clear()
             self._scene.show_links(ghosts, [_GHOST_COLOR] * len(origins))
             box = view.box(self.posed.spheres(ghosts), size)
-            layers.draw_over(self._scene, box, _GHOST_OPACITY)
+            if self._skinned and not any(frame.ghost_offset):
+                layers.draw_outline(self._scene, box, _OUTLINE_COLOR)
+            else:
+                layers.draw_over(self._scene, box, _GHOST_OPACITY)
         if frame.forces:
             arrows = [self.posed.arrow(each, frames, frame.arrow_length) for each in frame.forces]
             radius = _ARROW_RADIUS * view.distance
@@ -125,3 +140,17 @@ class Renderer:
 
 def _with_balls(bodies: Spheres, balls: FloatArray) -> Spheres:
     return Spheres.joined([bodies, Spheres(balls[:, :3], balls[:, 3])])
+
+
+def make_skins(characters: Sequence[Character]) -> list[Skinned]:
+    """The skins of those characters that have one; see `skin.making`."""
+    from actuated_characters.render.skin.making import has_skin, make_skin
+
+    skins, first = [], 0
+    for number, character in enumerate(characters):
+        links = slice(first, first + len(character.links))
+        first = links.stop
+        if has_skin(character):
+            colors = skin_colors(character, number)
+            skins.append(Skinned(PosedSkin(make_skin(character)), colors, links))
+    return skins

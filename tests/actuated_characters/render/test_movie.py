@@ -35,7 +35,7 @@ pytestmark = pytest.mark.slow
 RATE = 240
 SIZE = (96, 64)
 BOX = str(DATA / "free_box.yaml")
-HERE = MovieSettings(size=SIZE, workers=1)
+HERE = MovieSettings(skinned=False, size=SIZE, workers=1)
 
 
 def recorded(

@@ -69,7 +69,7 @@ def test_a_strip_has_the_states_nearest_to_the_times(recording: Recording, walk:
 
     positions = np.stack([walk.states[row].position for row in (0, 10, 60)])
     assert whole.shape == (80, 3 * 60 + 2 * GAP, 3)
-    camera = Renderer(walk.plan.character)
+    camera = Renderer(walk.plan.character, skinned=True)
     view = view_of(camera, positions, size=SIZE)
     for position, tile in zip(positions, tiles(whole, 3), strict=True):
         own = followed(camera, view, positions[0], position)
