@@ -62,8 +62,10 @@ class ViewerNode(Node):
         self._panel = ControlPanel(self, self._server.gui, self._scene, self._hands, self._actions)
         self._simulators = WatchedSimulators(self, self.get_namespace().rstrip("/"), self._log)
         self._drawn: dict[str, LiveCharacter] = {}
+        self._numbers: dict[str, int] = {}  # of the characters, by namespace, as they were found
         self._parameters: dict[str, Mapping[str, tuple[ShownParameter, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
+        self._framed: set[str] = set()  # the characters, by namespace, that the camera was set for
         self._announce(host, listening.getsockname()[1])
 
     def _announce(self, host: str, port: int) -> None:
@@ -120,6 +122,14 @@ class ViewerNode(Node):
                 self._balls[simulator].draw(*reader.take())
             self._hands.pull(self._drawn, self._stamps_ns())
             self._scene.follow_characters(list(self._drawn.values()), seconds)
+            self._frame_new_characters()
+
+    def _frame_new_characters(self) -> None:
+        """Have the cameras see all characters, once those that have come have been drawn."""
+        drawn = {below for below, each in self._drawn.items() if each.has_been_drawn}
+        if drawn == set(self._drawn) and not drawn <= self._framed:
+            self._framed |= drawn
+            self._scene.frame_characters(list(self._drawn.values()))
 
     def _draw(self, watched: WatchedNamespace) -> None:
         if watched.is_new_episode and watched.simulator in self._balls:
@@ -168,7 +178,8 @@ class ViewerNode(Node):
         self._parameters[below] = shown_parameters(rebuilt.character)
         try:
             with self._server.atomic():
-                self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind)
+                number = self._numbers.setdefault(below, len(self._numbers))
+                self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind, number)
         except ActuatedCharactersError as error:
             self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
 

@@ -19,7 +19,7 @@ Samples: TypeAlias = NDArray[np.float32]
 BACKGROUND: Samples = 255.0 * np.array((0.93, 0.95, 0.98), dtype=np.float32)
 
 _HAZE = (1.6, 2.9)  # view distances at which the background's colour begins, and is all
-_COLORS: Samples = 255.0 * np.array(((0.88, 0.90, 0.92), (0.70, 0.74, 0.79)), dtype=np.float32)
+COLORS: Samples = 255.0 * np.array(((0.88, 0.90, 0.92), (0.70, 0.74, 0.79)), dtype=np.float32)
 _LEAST_FOOTPRINT = np.float32(1e-4)  # tiles in a pixel at least: what single precision can tell
 _TILES_A_VIEW = 6  # tiles along the view's distance, or up to 2.5 times as many
 
@@ -102,7 +102,7 @@ def colors(view: CameraPose, size: Size) -> Samples:
     share = 1.0 - haze(depths(view, height, rows) / view.distance)
     seen = share > 0.0
     if seen.any():
-        dark, step = _COLORS[1], _COLORS[0] - _COLORS[1]
+        dark, step = COLORS[1], COLORS[0] - COLORS[1]
         light = _share_of_light(view, size, rows[seen], columns)
         clear = share[seen, np.newaxis].astype(np.float32)
         for channel in range(3):

@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
-from actuated_characters.viewer.drawing.drawn_character import Bind
+from actuated_characters.viewer.drawing.drawn_character import Bind, LinkMesh
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
 from msgs_config.arrays import FloatArray
@@ -54,7 +54,7 @@ class Hands:
     def bind(self, below: str, drawn: Callable[[], LiveCharacter | None]) -> Bind:
         """Let the links of a character, as it is drawn then, be dragged and clicked on."""
 
-        def bind(mesh: viser.MeshHandle, row: int) -> None:
+        def bind(mesh: LinkMesh, row: int) -> None:
             # coroutines, because viser calls functions in several threads, and in any order
             async def drag(event: viser.SceneNodeDragEvent[Any]) -> None:
                 self._actions.put(partial(self._drag, below, row, drawn, event))

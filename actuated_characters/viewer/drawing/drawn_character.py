@@ -9,20 +9,24 @@ import viser
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.shape_meshes import surface_of
 from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
+from actuated_characters.render.skin.making import has_skin, make_skin
+from actuated_characters.render.skin.palette import skin_colors
+from actuated_characters.render.skin.skin import Skin
+from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
 from actuated_characters.viewer.drawing.support import support_polygon
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character, Shape
+from msgs_config.character.model import Character, Quadruple, Shape
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
 _STRAIN_COLOR = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
 _LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
-_GHOST = (90, 120, 220)
-_GHOST_OPACITY = 0.25
+_GHOST = (64, 190, 110)
+_GHOST_OPACITY = 0.3  # where it has no skin, which is seen as an outline
 _CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
 _METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
 _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
@@ -35,14 +39,17 @@ SHOWN = {
     "forces": "Contacts and pushes",
     "balance": "Centre of mass and support",
     "torques": "Torques against limits",
+    "skin": "Skin",
 }
 """What is drawn beside the character itself, and what the panel calls it."""
 
-Bind = Callable[[viser.MeshHandle, int], None]
+LinkMesh = viser.MeshHandle | viser.MeshSkinnedHandle
+
+Bind = Callable[[LinkMesh, int], None]
 """Makes a shape of a link, by its number, one that can be touched."""
 
 
-def _bind_nothing(mesh: viser.MeshHandle, row: int) -> None:
+def _bind_nothing(mesh: LinkMesh, row: int) -> None:
     """Leave a shape as one that cannot be touched."""
 
 
@@ -56,8 +63,11 @@ class DrawnCharacter:
         character: Character,
         effort_limits: FloatArray,
         bind: Bind = _bind_nothing,
+        number: int = 0,
     ) -> None:
         """Add all nodes; limits (b,) are those of the character's physical vectors.
+
+        Its `number` among several characters says which colours its skin has.
 
         Raises:
             CharacterError: a mesh cannot be used.
@@ -66,6 +76,7 @@ class DrawnCharacter:
         self._scene, self._model = scene, DynamicsModel(character)
         shapes = drawn_shapes(character)
         self._outlines = [_around(link.collision_shapes) for link in character.links]
+        self._around = [_around(own) for own in shapes]
         self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._centres = np.array([link.inertial_pose.position for link in character.links])
         self._frames = [
@@ -75,24 +86,59 @@ class DrawnCharacter:
             scene.add_frame(f"{name}/ghost/{row}", show_axes=False, visible=False)
             for row in range(len(shapes))
         ]
-        self._meshes = [
+        self._meshes: list[list[LinkMesh]] = [
             [self._add(f"{name}/links/{row}/{k}", shape) for k, shape in enumerate(own)]
             for row, own in enumerate(shapes)
         ]
-        for row, own in enumerate(shapes):
-            for k, shape in enumerate(own):
-                self._add(f"{name}/ghost/{row}/{k}", shape, ghost=True)
-                bind(self._meshes[row][k], row)
+        self._shape_counts = [len(own) for own in shapes]
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
+        self._skin: DrawnSkin | None = None
+        self._ghost_skin: GhostSkin | None = None
+        if has_skin(character):
+            self._add_skin(make_skin(character), skin_colors(character, number))
+        else:
+            for row, own in enumerate(shapes):
+                for k, shape in enumerate(own):
+                    self._add(f"{name}/ghost/{row}/{k}", shape, ghost=True)
+        for row, meshes in enumerate(self._meshes):
+            for mesh in meshes:
+                bind(mesh, row)
         self._levels = [0] * len(shapes)
         self._vectors = _last_vectors(character)
         self._add_marks(scene, name)
         self.origins: FloatArray = np.zeros((len(shapes), 3))
         self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
         self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
+        self.has_been_drawn = False
+
+    def _add_skin(self, skin: Skin, colors: Sequence[Quadruple]) -> None:
+        """Add a skin around the shapes, which are hidden by it or instead of it."""
+        links = f"{self.name}/links"
+        self._skin = DrawnSkin(self._scene, links, self.character, skin, colors)
+        self._ghost_skin = GhostSkin(self._scene, f"{self.name}/ghost_skin", skin, _GHOST)
+        for row, color in enumerate(colors):
+            if (mesh := self._skin.handle(row)) is not None:
+                self._meshes[row].append(mesh)
+                self._colors[row].append(np.array(color[:3]) * 255.0)
+        self._show_skin(shown=True)
+
+    def _show_skin(self, *, shown: bool) -> None:
+        """Show the skin, if there is one, or the shapes."""
+        if self._skin is None:
+            return
+        for count, meshes in zip(self._shape_counts, self._meshes, strict=True):
+            for number, mesh in enumerate(meshes):
+                mesh.visible = shown == (number >= count)
 
     def _add_marks(self, scene: viser.SceneApi, name: str) -> None:
-        """Add what is seen beside the links: centre of mass, support polygon, arrows."""
+        """Add what is seen beside the links: centre of mass, support polygon, arrows.
+
+        All are below a frame that goes along with the root: a page changes the points of lines and
+        arrows later than the places of frames.
+        """
+        name = f"{name}/marks"
+        self._marks = scene.add_frame(name, show_axes=False)
+        self._marked: FloatArray = np.zeros(3)  # where that frame is, m, world
         self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
         self._below = scene.add_icosphere(f"{name}/below", 0.02, color=_CENTRE, visible=False)
         self._arrows = {
@@ -134,6 +180,14 @@ class DrawnCharacter:
         root: FloatArray = self.origins[0]
         return root
 
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The least and the greatest corner (3,) of a box around all its shapes, m, world."""
+        placed = [
+            Spheres(self.origins[row] + rotations.rotate(self.turns_xyzw[row], local), radii)
+            for row, (local, radii) in enumerate(self._around)
+        ]
+        return Spheres.joined(placed).bounds(np.eye(3))
+
     def remove(self) -> None:
         """Remove all nodes."""
         self._scene.remove_by_name(self.name)
@@ -142,17 +196,30 @@ class DrawnCharacter:
         """Move everything to where it is now."""
         if sample.state is None:
             return
-        shown = sample.reference if self.shows["reference"] else None
-        if shown is not None:
-            set_poses(self._ghost_frames, *self._poses(shown))
-        for frame in self._ghost_frames:
-            frame.visible = shown is not None
+        self.has_been_drawn = True
+        self._draw_ghost(sample.reference if self.shows["reference"] else None)
         self.origins, self.turns_xyzw = self._poses(sample.state.position)
         set_poses(self._frames, self.origins, self.turns_xyzw)
+        if self._skin is not None:
+            self._show_skin(shown=self.shows["skin"])
+            self._skin.bend(self.origins, self.turns_xyzw)
+        self._marked = np.append(self.origins[0, :2], 0.0)
+        set_poses([self._marks], self._marked[np.newaxis], np.array([[0.0, 0.0, 0.0, 1.0]]))
         self._color(sample.state.effort)
         self._draw_balance(sample.contacts)
         self._draw_arrows("contacts", sample.contacts)
         self._draw_arrows("pushes", sample.pushes)
+
+    def _draw_ghost(self, position: FloatArray | None) -> None:
+        """Draw the reference at a position (n,); None: there is none."""
+        if position is not None:
+            poses = self._poses(position)
+            if self._ghost_skin is not None:
+                self._ghost_skin.bend(*poses)
+            else:
+                set_poses(self._ghost_frames, *poses)
+        for node in self._ghost_frames if self._ghost_skin is None else [self._ghost_skin.handle]:
+            node.visible = position is not None
 
     def _poses(self, position: FloatArray) -> tuple[FloatArray, FloatArray]:
         self._model.update(position, np.zeros_like(position))
@@ -180,7 +247,7 @@ class DrawnCharacter:
         self._centre.visible = self._below.visible = shown
         corners = np.empty((0, 2))
         if shown:
-            centre = self._model.centre_of_mass()
+            centre = self._model.centre_of_mass() - self._marked
             self._centre.position = centre
             self._below.position = (*centre[:2], _ABOVE_GROUND)
             links = contacts.links if contacts is not None else ()
@@ -190,6 +257,7 @@ class DrawnCharacter:
             )
         self._support.visible = len(corners) > 1
         if len(corners) > 1:
+            corners -= self._marked[:2]
             ring = np.column_stack((corners, np.full(len(corners), _ABOVE_GROUND)))
             self._support.points = np.stack((ring, np.roll(ring, -1, axis=0)), axis=1)
 
@@ -210,7 +278,9 @@ class DrawnCharacter:
         handle = self._arrows[what]
         handle.visible = bool(arrows)
         if arrows:
-            handle.points = np.array(arrows)
+            handle.points = np.array(
+                [(tail - self._marked, tip - self._marked) for tail, tip in arrows]
+            )
 
     def point(self, row: int, local: FloatArray) -> FloatArray:
         """A point (3,) of a link, m in its frame, in the world."""

@@ -9,9 +9,12 @@ from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharac
 class LiveCharacter(DrawnCharacter):
     """A drawn character, and what its simulator says of it and of its world."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, rebuilt: Rebuilt, bind: Bind) -> None:
-        """Add all nodes. Raises CharacterError if a mesh cannot be used."""
-        super().__init__(scene, name, rebuilt.character, rebuilt.known.effort_limits, bind)
+    def __init__(
+        self, scene: viser.SceneApi, name: str, rebuilt: Rebuilt, bind: Bind, number: int
+    ) -> None:
+        """Add all nodes; see DrawnCharacter. Raises CharacterError if a mesh cannot be used."""
+        limits = rebuilt.known.effort_limits
+        super().__init__(scene, name, rebuilt.character, limits, bind, number)
         self.rebuilt = rebuilt
 
     def take(self, rebuilt: Rebuilt) -> bool:

@@ -1,4 +1,4 @@
-"""The scene in the browser: ground, light, balls, and a frame that follows the characters.
+"""The scene in the browser: ground, light, camera, balls, and a frame that follows the characters.
 
 The camera belongs to each client, and no server can move it without a jerk. So it is the world that
 moves: everything is below one node, which moves back by as far as the characters have gone.
@@ -6,10 +6,13 @@ moves: everything is below one node, which moves back by as far as the character
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
+from actuated_characters.render.engine import ground
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
@@ -21,9 +24,28 @@ WORLD = "/world"
 _BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # colour; m
 _CATCH_UP = 4.0  # 1/s: how soon the world follows the characters
 _JUMP = 3.0  # m: a distance that is not caught up with but jumped
-BACKGROUND = (237, 242, 250)
+BACKGROUND, LIGHT_TILE, DARK_TILE = (
+    tuple(np.round(each).astype(int).tolist()) for each in (ground.BACKGROUND, *ground.COLORS)
+)
 EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
-"""Of the camera at first, m, from the point on the ground below the middle of the characters."""
+"""Of the camera until a character is there, m, from the point on the ground below."""
+
+_FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
+_SHARE = 0.62  # of the view's height that characters take
+_WIDTH_OF_HEIGHT = 1.1  # of the view, beside the panel
+_TILE = 0.5  # m
+_TILES = 56  # along an edge of the ground
+_PIXELS_A_TILE = 36
+_ABOVE_TILES = 1e-3  # m
+_SHADOW = 0.3
+_HAZE = (6.0, 13.0)  # m from the camera: where the background's colour begins, and is all
+_HAZE_COLOR = (216, 226, 244)  # becomes the background's by a page's tone mapping
+_SKY_LIGHT: dict[str, Any] = {
+    "sky_color": (255, 252, 246),
+    "ground_color": (120, 124, 134),
+    "intensity": 2.5,
+    "wxyz": (0.5**0.5, 0.5**0.5, 0.0, 0.0),  # its own y, from where it shines, up
+}
 
 
 class BrowserScene:
@@ -38,35 +60,74 @@ class BrowserScene:
         scene.set_up_direction("+z")
         scene.set_background_image(np.full((2, 2, 3), BACKGROUND, dtype=np.uint8))
         scene.configure_default_lights(enabled=True, cast_shadow=True)
+        # without the picture of a hall that a page is lit by else, which tints what is plain
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/sky", **_SKY_LIGHT)
+        scene.configure_fog(*_HAZE, color=_HAZE_COLOR)
+        self._server = server
+        server.initial_camera.fov = _FIELD_OF_VIEW
         server.initial_camera.position = EYE
         server.initial_camera.look_at = LOOK_AT
         self._world = scene.add_frame(WORLD, show_axes=False)
-        self._ground = scene.add_grid(
-            f"{WORLD}/ground",
-            width=60.0,
-            height=60.0,
-            cell_size=0.5,
-            section_size=1.0,
-            cell_color=(205, 212, 222),
-            section_color=(165, 175, 190),
-            plane_color=(247, 249, 252),
-            plane_opacity=1.0,
-            fade_distance=25.0,
-            shadow_opacity=0.25,
-        )
+        self._ground = scene.add_frame(f"{WORLD}/ground", show_axes=False)
+        edge = _TILES * _TILE
+        scene.add_image(
+            f"{WORLD}/ground/tiles", _chequerboard(), edge, edge, format="png",
+            cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip
+        # An image takes no shadow, and a mesh that does costs a page without a graphics card thirty
+        # times as much as this plane, of which nothing but the shadow is seen.
+        scene.add_grid(
+            f"{WORLD}/ground/shadow", edge, edge, position=(0.0, 0.0, _ABOVE_TILES),
+            cell_thickness=0.0, section_thickness=0.0, plane_opacity=0.0, shadow_opacity=_SHADOW,
+        )  # fmt: skip
+
+    def frame_characters(self, characters: Sequence[DrawnCharacter]) -> None:
+        """Have all pages see the characters where they are now, as large as fits."""
+        if not characters:
+            return
+        low = np.min([each.bounds()[0] for each in characters], axis=0)
+        high = np.max([each.bounds()[1] for each in characters], axis=0)
+        across = float(np.hypot(*(high - low)[:2]))
+        size = max(float(high[2] - low[2]), across / _WIDTH_OF_HEIGHT)
+        away = 0.5 * size / (_SHARE * np.tan(0.5 * _FIELD_OF_VIEW))
+        followed = self._followed(characters)
+        middle = 0.5 * (low + high) - (self.offset if followed is None else followed)
+        back = np.subtract(EYE, LOOK_AT)
+        eye = middle + away / np.linalg.norm(back) * back
+        initial = self._server.initial_camera
+        initial.position, initial.look_at = eye, middle
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = eye, middle
+
+    def _followed(self, characters: Sequence[DrawnCharacter]) -> FloatArray | None:
+        """The point (3,) of the ground that is followed, m, world; None if none is."""
+        moving = [each for each in characters if each.character.layout.has_floating_base]
+        if not (self.follows and moving) or len(moving) != len(characters):
+            return None
+        return np.append(np.mean([each.root[:2] for each in moving], axis=0), 0.0)
 
     def follow_characters(self, characters: Sequence[DrawnCharacter], seconds: float) -> None:
         """Bring the middle of the characters nearer to where the cameras look."""
-        moving = [each for each in characters if each.character.layout.has_floating_base]
-        if not (self.follows and moving) or len(moving) != len(characters):
+        middle = self._followed(characters)
+        if middle is None:
             return
-        middle = np.append(np.mean([each.root[:2] for each in moving], axis=0), 0.0)
         way = middle - self.offset
         share = 1.0 if np.linalg.norm(way) > _JUMP else 1.0 - np.exp(-_CATCH_UP * seconds)
         self.offset = self.offset + share * way
         self._world.position = -self.offset
-        # the grid moves along by whole sections, or the characters would walk off it
-        self._ground.position = (*np.round(self.offset[:2]), 0.0)
+        # the ground moves along by pairs of tiles, or the characters would walk off it
+        pair = 2.0 * _TILE
+        self._ground.position = (*(pair * np.round(self.offset[:2] / pair)), 0.0)
+
+
+def _chequerboard() -> NDArray[np.uint8]:
+    """The ground's picture (h, w, 3)."""
+    number = np.arange(_TILES * _PIXELS_A_TILE) // _PIXELS_A_TILE
+    is_dark = (number[:, np.newaxis] + number) % 2
+    colors = np.array((LIGHT_TILE, DARK_TILE), dtype=np.uint8)
+    picture: NDArray[np.uint8] = colors[is_dark]
+    return picture
 
 
 class DrawnBalls:

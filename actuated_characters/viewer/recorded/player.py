@@ -46,6 +46,7 @@ class RecordedPlayer:
                 f"{WORLD}/characters/{number}",
                 each.character,
                 each.character.effort_limits(),
+                number=number,
             )
             for number, each in enumerate(run.recordings)
         ]
@@ -60,6 +61,9 @@ class RecordedPlayer:
         self._panel.character.visible = len(self._curves) > 1
         self._plotted = ""
         self._fork: Fork | None = None
+        self._timeline.play()
+        self._draw(0.0)
+        self._scene.frame_characters(self._drawn)
 
     def play(self, fps: float, rejections: Rejections) -> None:
         """Show it until an interruption, and print what is rejected."""

@@ -42,6 +42,13 @@ _HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",  # or a page that came without these headers could be shown again
 }
+# The page of viser 1.1.1 fails, and stays empty, where a skinned mesh goes: as a character does, or
+# all as the viewer is started anew. Loaded once more it shows what is there.
+_LOADED_AGAIN = b"""<script>
+addEventListener("error", event => {
+  if (event.message.includes("reading 'remove'")) location.reload();
+});
+</script>"""
 _STARTING_PAGE = "the viewer starts; this page comes again by itself\n"
 
 Serve = Callable[[ServerConnection, Request], Response | None]
@@ -113,10 +120,23 @@ class ServerGate:
         if upgrades and _PROTOCOL not in _protocols(request):
             return respond(HTTPStatus.BAD_REQUEST, f"this server speaks {_PROTOCOL}\n")
         try:
-            return serve(connection, request)
+            if "Accept-Encoding" in request.headers:  # what is zipped could not be added to
+                del request.headers["Accept-Encoding"]
+            page = serve(connection, request)
+            return page if page is None else _with_reload(page)
         except Exception as error:  # a request that viser does not understand ends no connection
             self.reject(f"rejected a request: {error!r}")
             return respond(HTTPStatus.BAD_REQUEST, "this request is not understood\n")
+
+
+def _with_reload(response: Response) -> Response:
+    """A response, with what loads a page of it once more where that fails."""
+    body = response.body.replace(b"<head>", b"<head>" + _LOADED_AGAIN, 1)
+    if body != response.body:
+        response.body = body
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(body))
+    return response
 
 
 class _Told(logging.Handler):

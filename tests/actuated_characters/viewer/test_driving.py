@@ -56,6 +56,20 @@ def shows_drive(browser: Browser) -> bool:
     return browser.place(BUTTON) is not None
 
 
+def resting_place(browser: Browser) -> tuple[float, float]:
+    """Where the button is once the page, which is still being built, moves it no more."""
+    places: list[tuple[float, float] | None] = [None]
+
+    def rests() -> bool:
+        places.append(browser.place(BUTTON))
+        return places[-1] is not None and places[-1] == places[-2]
+
+    wait_until(rests, "the button rests", SOON, lambda: time.sleep(1.0))
+    place = places[-1]
+    assert place is not None
+    return place
+
+
 class HeldKey:
     """A key that is down, and repeated as a system does."""
 
@@ -135,6 +149,7 @@ def test_keys_walk_run_turn_and_stop_when_they_are_let_go_which_replays_to_the_b
     right = HeldKey(browser, "ArrowRight", SHIFT)
     right.until(client, lambda: (0.0, 0.0, -0.8) in seen(velocities), "right")
     right.release()
+    client.spin_until(lambda: last(velocities) == (0.0, 0.0, 0.0), "its end, or it counts on", SOON)
     run = HeldKey(browser, "ArrowUp", SHIFT)
     run.until(client, lambda: (2.2, 0.0, 0.0) in seen(velocities), "it runs")
     browser.key("Space")
@@ -160,8 +175,7 @@ def test_the_button_drives_at_the_sliders_velocities_until_it_is_let_go_or_the_b
     published = client.listen(topics.CMD_VEL)
 
     def hold() -> tuple[float, float]:
-        place, before = browser.place(BUTTON), len(published.messages)
-        assert place is not None
+        place, before = resting_place(browser), len(published.messages)
         browser.press(*place)
         client.spin_until(lambda: len(published.messages) > before + 10, "velocities", SOON)
         assert seen(velocities) <= {(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)}

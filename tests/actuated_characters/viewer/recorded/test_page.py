@@ -74,8 +74,11 @@ def open_folder(browser: Browser, label: str) -> None:
 
 
 def test_a_run_plays_is_saved_and_is_forked(viewer: Process, browser: Browser, walk: Path) -> None:
-    before = load(browser, viewer)
-    assert "state 0 of 240" in text_of(browser)
+    load(browser, viewer)
+    wait_until(lambda: "state 240 of 240" in text_of(browser), "it has played by itself", SOON)
+    browser.click("Start")
+    wait_until(lambda: "state 0 of 240" in text_of(browser), "the start", SOON)
+    before = browser.pixels()
 
     check_that_what_is_seen_is_saved_as_a_picture_and_as_a_film(browser, walk)
     check_that_it_plays_stops_and_steps(browser, before)

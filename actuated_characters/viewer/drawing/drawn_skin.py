@@ -1,0 +1,179 @@
+"""A character's skin in the browser: a skinned mesh for each link, or one for all of a ghost.
+
+Each link has a mesh of its own, below its frame, so that it can be touched and coloured. The page
+makes the normals of a mesh of its own triangles; so each has those around its edge as well, a
+little deeper, where its neighbour's hide them.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from viser._messages import SetBoneOrientationMessage, SetBonePositionMessage
+
+from actuated_characters.render.skin.skin import Skin
+from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.model import Character, Quadruple
+from msgs_config.geometry import rotations
+
+_SUNK = 4e-4  # m: how much deeper the triangles around a mesh's edge end
+_STILL = 1e-5  # m: a bone that has moved by less is not sent
+_UNTURNED = 5e-4  # of a quaternion's entries: nor is one that has turned by less
+_NO_TURN_WXYZ = (1.0, 0.0, 0.0, 0.0)
+_OUTLINE_WIDTH = 0.007  # m
+_OPACITY = 0.45  # of a ghost
+
+
+class DrawnSkin:
+    """The skin of a drawn character, whose link frames are at hand in the scene.
+
+    A mesh lies in its own link's frame. The other bones of it are frames of the links joined to
+    that one, with their origins where the joint is, so that they turn, but hardly move.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        links: str,
+        character: Character,
+        skin: Skin,
+        colors: Sequence[Quadruple],
+    ) -> None:
+        """Add a mesh to each link's frame, `links`/ROW, that has any of the skin."""
+        self._handles: dict[int, viser.MeshSkinnedHandle] = {}
+        joints, anchors = _joined(character, skin)
+        self._own, self._other = np.array(joints, dtype=np.intp).reshape(-1, 2).T
+        self._anchors = np.array(anchors).reshape(-1, 3)
+        self._places, self._turns = self._poses(skin.origins, skin.turns_xyzw)
+        for row in sorted(set(skin.owners.tolist())):
+            rows = np.flatnonzero(self._own == row)
+            handle = scene.add_mesh_skinned(
+                f"{links}/{row}/skin",
+                *_piece(skin, row),
+                bone_wxyzs=np.concatenate(([_NO_TURN_WXYZ], self._turns[rows])),
+                bone_positions=np.concatenate((np.zeros((1, 3)), self._places[rows])),
+                skin_weights=_weights(skin, _corners(skin, row), [row, *self._other[rows]]),
+                color=_rgb(colors[row]),
+                receive_shadow=False,
+            )
+            self._handles[row] = handle
+        self._bones = [self._bone(number) for number in range(len(self._own))]
+
+    def _bone(self, number: int) -> tuple[viser.MeshSkinnedHandle | None, int]:
+        """The mesh that a bone moves, and its number there, below which is the own link's."""
+        row = int(self._own[number])
+        return self._handles.get(row), 1 + int((self._own[:number] == row).sum())
+
+    def handle(self, row: int) -> viser.MeshSkinnedHandle | None:
+        """What is seen of a link; None: nothing."""
+        return self._handles.get(row)
+
+    def _poses(self, origins: FloatArray, turns_xyzw: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Where the bones are in the frames of their meshes: (b, 3), m, and (b, 4), wxyz."""
+        back, turns = rotations.conjugate(turns_xyzw[self._own]), turns_xyzw[self._other]
+        ways = origins[self._other] + rotations.rotate(turns, self._anchors) - origins[self._own]
+        relative = rotations.multiply(back, turns)
+        return rotations.rotate(back, ways), relative[:, (3, 0, 1, 2)]
+
+    def bend(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
+        """Have it follow the links: origins (l, 3), m, and orientations (l, 4)."""
+        places, turns = self._poses(origins, turns_xyzw)
+        moved = np.abs(places - self._places).max(axis=1) > _STILL
+        turned = np.abs(turns - self._turns).max(axis=1) > _UNTURNED
+        self._places[moved], self._turns[turned] = places[moved], turns[turned]
+        for number in np.flatnonzero(moved | turned).tolist():
+            handle, bone = self._bones[number]
+            if handle is None:
+                continue
+            impl = handle._impl
+            send = impl.api._queue_scene_message
+            if turned[number]:
+                turn = tuple(turns[number].tolist())
+                send(SetBoneOrientationMessage(impl.name, bone, turn))
+            if moved[number]:
+                send(SetBonePositionMessage(impl.name, bone, tuple(places[number].tolist())))
+
+
+class GhostSkin:
+    """A reference: the inner side of a skin that is a little wider, which bodies before it hide."""
+
+    def __init__(
+        self, scene: viser.SceneApi, name: str, skin: Skin, color: tuple[int, int, int]
+    ) -> None:
+        """Add it as one mesh."""
+        surface = skin.surface
+        self.handle = scene.add_mesh_skinned(
+            name,
+            surface.vertices + _OUTLINE_WIDTH * surface.normals,
+            surface.triangles,
+            bone_wxyzs=rotations.wxyz_from_xyzw(skin.turns_xyzw),
+            bone_positions=skin.origins,
+            skin_weights=_weights(skin, np.arange(len(skin.bones)), range(len(skin.origins))),
+            color=color,
+            side="back",
+            opacity=_OPACITY,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+    def bend(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
+        """Have it follow the links: origins (l, 3), m, world, and orientations (l, 4)."""
+        impl = self.handle._impl
+        turns = turns_xyzw[:, (3, 0, 1, 2)].tolist()
+        for bone, (place, turn) in enumerate(zip(origins.tolist(), turns, strict=True)):
+            impl.api._queue_scene_message(SetBonePositionMessage(impl.name, bone, tuple(place)))
+            impl.api._queue_scene_message(SetBoneOrientationMessage(impl.name, bone, tuple(turn)))
+
+
+def _joined(character: Character, skin: Skin) -> tuple[list[tuple[int, int]], list[FloatArray]]:
+    """Each link with each one joined to it; with that the joint's place in the other one, m."""
+    joined, anchors = [], []
+    for child, link in enumerate(character.links):
+        if link.parent >= 0:
+            back = rotations.conjugate(skin.turns_xyzw[link.parent])
+            way = skin.origins[child] - skin.origins[link.parent]
+            joined += [(link.parent, child), (child, link.parent)]
+            anchors += [np.zeros(3), rotations.rotate(back, way)]
+    return joined, anchors
+
+
+def _corners(skin: Skin, row: int) -> IntArray:
+    """The vertices (m,) of a link's triangles and of those that touch them."""
+    found: IntArray = np.unique(_with_edge(skin.surface.triangles, skin.owners == row))
+    return found
+
+
+def _piece(skin: Skin, row: int) -> tuple[FloatArray, IntArray]:
+    """The vertices (m, 3) in a link's frame, m, and the triangles (k, 3) of its mesh."""
+    triangles, used = _with_edge(skin.surface.triangles, skin.owners == row), _corners(skin, row)
+    vertices = skin.surface.vertices[used].copy()
+    around = ~np.isin(used, skin.surface.triangles[skin.owners == row])
+    vertices[around] -= _SUNK * skin.surface.normals[used][around]
+    back = rotations.conjugate(skin.turns_xyzw[row])
+    return rotations.rotate(back, vertices - skin.origins[row]), np.searchsorted(used, triangles)
+
+
+def _weights(skin: Skin, vertices: IntArray, rows: Sequence[int]) -> FloatArray:
+    """Of some vertices (m,) how much they follow links (b,), of sum one (m, b)."""
+    whole = np.zeros((len(vertices), len(skin.origins)))
+    for bone in range(skin.bones.shape[1]):
+        whole[np.arange(len(vertices)), skin.bones[vertices, bone]] += skin.weights[vertices, bone]
+    weights = whole[:, list(rows)]
+    total = weights.sum(axis=1, keepdims=True)
+    weights[total[:, 0] == 0.0, 0], total[total == 0.0] = 1.0, 1.0
+    shares: FloatArray = weights / total
+    return shares
+
+
+def _with_edge(triangles: IntArray, chosen: np.ndarray) -> IntArray:
+    """Of triangles (k, 3) those that are chosen, and all that touch them."""
+    touched = np.zeros(int(triangles.max()) + 1, dtype=np.bool_)
+    touched[triangles[chosen]] = True
+    found: IntArray = triangles[touched[triangles].any(axis=1)]
+    return found
+
+
+def _rgb(color: Quadruple) -> tuple[int, int, int]:
+    red, green, blue = (round(255.0 * part) for part in color[:3])
+    return red, green, blue
