@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -29,6 +31,7 @@ MODULES = {
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
+_REPETITION = 2.0  # s after which a signal to a child is repeated
 _LAST_LINES = 3  # are told of a process that failed without saying why
 _PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent, not for a reader
 _WARNING_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # rcutils' form
@@ -164,14 +167,18 @@ class Child:
             self._process.send_signal(number)
 
     def end(self, request: signal.Signals | None = None, patience: float = _END_TIMEOUT) -> int:
-        """Send a signal if one is given, wait, kill after `patience` s; return the exit code."""
-        if request is not None:
-            self.send(request)
-        try:
-            return self._process.wait(patience)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            return self._process.wait()
+        """Send a signal if one is given, wait, kill after `patience` s; return the exit code.
+
+        The signal is sent again and again: one that comes while Python begins can be lost.
+        """
+        deadline = time.monotonic() + patience
+        while (left := deadline - time.monotonic()) > 0.0:
+            if request is not None:
+                self.send(request)
+            with suppress(subprocess.TimeoutExpired):
+                return self._process.wait(min(left, _REPETITION))
+        self._process.kill()
+        return self._process.wait()
 
 
 def _filled_lines(text: str) -> list[str]:

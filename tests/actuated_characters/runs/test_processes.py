@@ -7,6 +7,7 @@ import pytest
 
 from actuated_characters.runs.execution import wait_for_end
 from actuated_characters.runs.processes import Child
+from tests.support.ros import wait_until
 
 WAITS = "[WARN] [1795640914.507989722] [sim_node]: waiting for 2 subscribers of joint_states"
 
@@ -70,3 +71,22 @@ def test_what_a_node_waits_for_is_shown_once_while_no_tick_comes(
 
     told = capsys.readouterr().out.splitlines()
     assert told == ["sim_node: waiting for 2 subscribers of joint_states"]
+
+
+DEAF_ONCE = """
+import signal, sys, time
+came = []
+signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+print("ready", flush=True)
+while len(came) < 2:
+    time.sleep(0.01)
+"""
+
+
+def test_a_signal_that_a_child_has_not_taken_is_sent_again(tmp_path: Path) -> None:
+    process = child(tmp_path, "deaf", DEAF_ONCE)
+    try:
+        wait_until(process.read_lines, "it has a handler")
+        assert process.end(signal.SIGINT, patience=30.0) == 0
+    finally:
+        process.end(signal.SIGKILL)
