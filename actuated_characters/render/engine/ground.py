@@ -118,9 +118,9 @@ def haze(distance: FloatArray | Samples) -> Samples:
     return share
 
 
-def tile_length(view: CameraPose) -> float:
-    """Edge of a tile, m: 1, 2 or 5 times a power of ten."""
-    length = view.distance / _TILES_A_VIEW
+def tile_length(distance: float) -> float:
+    """Edge of a tile, m, seen from a distance, m: 1, 2 or 5 times a power of ten."""
+    length = distance / _TILES_A_VIEW
     power = 10.0 ** np.floor(np.log10(length))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length))
 
@@ -131,7 +131,7 @@ def _share_of_light(view: CameraPose, size: Size, rows: FloatArray, columns: Flo
     A pixel's footprint is taken as a rectangle along the grid: then the mean of the product of two
     square waves is the product of their means.
     """
-    tile = tile_length(view)
+    tile = tile_length(view.distance)
     right = view.axes()[0]
     depth = depths(view, size[1], rows)
     middles = places(view, size, rows, columns)

@@ -13,6 +13,7 @@ from msgs_config.geometry import fixed_order, rotations
 
 _TURNS = (0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, tried about each axis of each joint
 _SWEEPS = 2  # over all joints
+_MOST_CORES = 80  # of a character that is not left at rest
 _SAMPLES = 4  # points along a core
 _GAP = 1.2  # how far apart links are to be, in radii of the thicker one
 # What a turn by one radian must bring at least, m: more, the more of the body it moves.
@@ -26,8 +27,10 @@ def spread_pose(character: Character, cores: Sequence[Sequence[Core]]) -> FloatA
         character: Whose.
         cores: Of the shapes of each link, in its frame.
     """
-    gaps = _Gaps(character, cores)
     position = np.array(character.rest_position)
+    if sum(map(len, cores)) > _MOST_CORES:  # each with each other one would take minutes
+        return position
+    gaps = _Gaps(character, cores)
     best = gaps.total(position)
     for entry, share in _turning_entries(character) * _SWEEPS:
         if best >= gaps.most:

@@ -33,12 +33,12 @@ EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
 _FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
 _SHARE = 0.62  # of the view's height that characters take
 _WIDTH_OF_HEIGHT = 1.1  # of the view, beside the panel
-_TILE = 0.5  # m
 _TILES = 56  # along an edge of the ground
 _PIXELS_A_TILE = 36
-_ABOVE_TILES = 1e-3  # m
+_ABOVE_TILES = 0.002  # of a tile's edge: where the shadow is drawn
 _SHADOW = 0.3
-_HAZE = (6.0, 13.0)  # m from the camera: where the background's colour begins, and is all
+# In the camera's distance at first: where the background's colour begins, and is all.
+_HAZE = (2.0, 4.2)
 _HAZE_COLOR = (216, 226, 244)  # becomes the background's by a page's tone mapping
 _SKY_LIGHT: dict[str, Any] = {
     "sky_color": (255, 252, 246),
@@ -63,24 +63,31 @@ class BrowserScene:
         # without the picture of a hall that a page is lit by else, which tints what is plain
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/sky", **_SKY_LIGHT)
-        scene.configure_fog(*_HAZE, color=_HAZE_COLOR)
         self._server = server
         server.initial_camera.fov = _FIELD_OF_VIEW
         server.initial_camera.position = EYE
         server.initial_camera.look_at = LOOK_AT
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._ground = scene.add_frame(f"{WORLD}/ground", show_axes=False)
-        edge = _TILES * _TILE
-        scene.add_image(
-            f"{WORLD}/ground/tiles", _chequerboard(), edge, edge, format="png",
+        tiles: Any = scene.add_image(
+            f"{WORLD}/ground/tiles", _chequerboard(), _TILES, _TILES, format="png",
             cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
-        # An image takes no shadow, and a mesh that does costs a page without a graphics card thirty
-        # times as much as this plane, of which nothing but the shadow is seen.
-        scene.add_grid(
-            f"{WORLD}/ground/shadow", edge, edge, position=(0.0, 0.0, _ABOVE_TILES),
-            cell_thickness=0.0, section_thickness=0.0, plane_opacity=0.0, shadow_opacity=_SHADOW,
+        # An image takes no shadow; of this plane nothing else is seen.
+        shadow: Any = scene.add_grid(
+            f"{WORLD}/ground/shadow", _TILES, _TILES, cell_thickness=0.0, section_thickness=0.0,
+            plane_opacity=0.0, shadow_opacity=_SHADOW,
         )  # fmt: skip
+        self._tiles, self._shadow = tiles, shadow
+        self._fit_ground(float(np.linalg.norm(np.subtract(EYE, LOOK_AT))))
+
+    def _fit_ground(self, distance: float) -> None:
+        """Have tiles and haze suit a camera that is so far away, m."""
+        self._tile = ground.tile_length(distance)
+        self._tiles.scale = self._shadow.scale = self._tile
+        self._shadow.position = (0.0, 0.0, _ABOVE_TILES * self._tile)
+        near, far = (share * distance for share in _HAZE)
+        self.api.configure_fog(near, far, color=_HAZE_COLOR)
 
     def frame_characters(self, characters: Sequence[DrawnCharacter]) -> None:
         """Have all pages see the characters where they are now, as large as fits."""
@@ -93,6 +100,7 @@ class BrowserScene:
         away = 0.5 * size / (_SHARE * np.tan(0.5 * _FIELD_OF_VIEW))
         followed = self._followed(characters)
         middle = 0.5 * (low + high) - (self.offset if followed is None else followed)
+        self._fit_ground(float(away))
         back = np.subtract(EYE, LOOK_AT)
         eye = middle + away / np.linalg.norm(back) * back
         initial = self._server.initial_camera
@@ -117,7 +125,7 @@ class BrowserScene:
         self.offset = self.offset + share * way
         self._world.position = -self.offset
         # the ground moves along by pairs of tiles, or the characters would walk off it
-        pair = 2.0 * _TILE
+        pair = 2.0 * self._tile
         self._ground.position = (*(pair * np.round(self.offset[:2] / pair)), 0.0)
 
 

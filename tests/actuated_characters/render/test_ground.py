@@ -63,7 +63,7 @@ def _light_tiles(view: CameraPose, size: tuple[int, int], fine: int) -> np.ndarr
     """1 where a ray meets a light tile, with so many rays along each edge of a pixel."""
     rows, columns = ((np.arange(edge * fine) + 0.5) / fine for edge in size[::-1])
     x, y = ground.places(view, size, rows, columns)
-    tile = ground.tile_length(view)
+    tile = ground.tile_length(view.distance)
     with np.errstate(invalid="ignore"):
         return ((np.floor(x / tile) + np.floor(y / tile)) % 2.0 == 0.0).astype(float)
 
@@ -85,6 +85,6 @@ def test_from_the_ground_or_below_there_is_none(height: float) -> None:
 
 
 def test_tiles_are_1_2_or_5_times_a_power_of_ten() -> None:
-    lengths = {ground.tile_length(CameraPose(distance=d)) for d in (0.7, 3.0, 5.9, 6.1, 13.0, 31.0)}
+    lengths = {ground.tile_length(d) for d in (0.7, 3.0, 5.9, 6.1, 13.0, 31.0)}
 
     assert lengths == {0.1, 0.5, 1.0, 2.0, 5.0}
