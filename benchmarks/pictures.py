@@ -1,4 +1,4 @@
-"""Pictures of planned motion, the reference transparent: `python -m benchmarks.pictures`.
+"""Pictures of planned motion, the reference an outline: `python -m benchmarks.pictures`.
 
 Those of docs/planning.md, all clips at some of their moments and two moving pictures, and the
 README's. It takes a quarter of an hour; `--only hero.webp` makes one of them.
