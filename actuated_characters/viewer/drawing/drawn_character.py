@@ -93,6 +93,7 @@ class DrawnCharacter:
         self._shape_counts = [len(own) for own in shapes]
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
         self._skin: DrawnSkin | None = None
+        self._shows_skin = False
         self._ghost_skin: GhostSkin | None = None
         if has_skin(character):
             self._add_skin(make_skin(character), skin_colors(character, number))
@@ -114,18 +115,21 @@ class DrawnCharacter:
     def _add_skin(self, skin: Skin, colors: Sequence[Quadruple]) -> None:
         """Add a skin around the shapes, which are hidden by it or instead of it."""
         links = f"{self.name}/links"
-        self._skin = DrawnSkin(self._scene, links, self.character, skin, colors)
+        own = [255.0 * np.array(color[:3]) for color in colors]
+        rgb = [_rgb(color) for color in own]
+        self._skin = DrawnSkin(self._scene, links, self.character, skin, rgb)
         self._ghost_skin = GhostSkin(self._scene, f"{self.name}/ghost_skin", skin, _GHOST)
-        for row, color in enumerate(colors):
+        for row, color in enumerate(own):
             if (mesh := self._skin.handle(row)) is not None:
                 self._meshes[row].append(mesh)
-                self._colors[row].append(np.array(color[:3]) * 255.0)
+                self._colors[row].append(color)
         self._show_skin(shown=True)
 
     def _show_skin(self, *, shown: bool) -> None:
         """Show the skin, if there is one, or the shapes."""
-        if self._skin is None:
+        if self._skin is None or shown == self._shows_skin:
             return
+        self._shows_skin = shown
         for count, meshes in zip(self._shape_counts, self._meshes, strict=True):
             for number, mesh in enumerate(meshes):
                 mesh.visible = shown == (number >= count)

@@ -6,6 +6,7 @@ little deeper, where its neighbour's hide them.
 """
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 import viser
@@ -13,8 +14,11 @@ from viser._messages import SetBoneOrientationMessage, SetBonePositionMessage
 
 from actuated_characters.render.skin.skin import Skin
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.model import Character, Quadruple
+from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+
+Color: TypeAlias = tuple[int, int, int]
+"""Red, green and blue, 0 to 255."""
 
 _SUNK = 4e-4  # m: how much deeper the triangles around a mesh's edge end
 _STILL = 1e-5  # m: a bone that has moved by less is not sent
@@ -37,7 +41,7 @@ class DrawnSkin:
         links: str,
         character: Character,
         skin: Skin,
-        colors: Sequence[Quadruple],
+        colors: Sequence[Color],
     ) -> None:
         """Add a mesh to each link's frame, `links`/ROW, that has any of the skin."""
         self._handles: dict[int, viser.MeshSkinnedHandle] = {}
@@ -47,13 +51,15 @@ class DrawnSkin:
         self._places, self._turns = self._poses(skin.origins, skin.turns_xyzw)
         for row in sorted(set(skin.owners.tolist())):
             rows = np.flatnonzero(self._own == row)
+            vertices, faces, used = _piece(skin, row)
             handle = scene.add_mesh_skinned(
                 f"{links}/{row}/skin",
-                *_piece(skin, row),
+                vertices,
+                faces,
                 bone_wxyzs=np.concatenate(([_NO_TURN_WXYZ], self._turns[rows])),
                 bone_positions=np.concatenate((np.zeros((1, 3)), self._places[rows])),
-                skin_weights=_weights(skin, _corners(skin, row), [row, *self._other[rows]]),
-                color=_rgb(colors[row]),
+                skin_weights=_weights(skin, used, [row, *self._other[rows]]),
+                color=colors[row],
                 receive_shadow=False,
             )
             self._handles[row] = handle
@@ -73,7 +79,7 @@ class DrawnSkin:
         back, turns = rotations.conjugate(turns_xyzw[self._own]), turns_xyzw[self._other]
         ways = origins[self._other] + rotations.rotate(turns, self._anchors) - origins[self._own]
         relative = rotations.multiply(back, turns)
-        return rotations.rotate(back, ways), relative[:, (3, 0, 1, 2)]
+        return rotations.rotate(back, ways), rotations.wxyz_from_xyzw(relative)
 
     def bend(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
         """Have it follow the links: origins (l, 3), m, and orientations (l, 4)."""
@@ -97,9 +103,7 @@ class DrawnSkin:
 class GhostSkin:
     """A reference: the inner side of a skin that is a little wider, which bodies before it hide."""
 
-    def __init__(
-        self, scene: viser.SceneApi, name: str, skin: Skin, color: tuple[int, int, int]
-    ) -> None:
+    def __init__(self, scene: viser.SceneApi, name: str, skin: Skin, color: Color) -> None:
         """Add it as one mesh."""
         surface = skin.surface
         self.handle = scene.add_mesh_skinned(
@@ -120,7 +124,7 @@ class GhostSkin:
     def bend(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
         """Have it follow the links: origins (l, 3), m, world, and orientations (l, 4)."""
         impl = self.handle._impl
-        turns = turns_xyzw[:, (3, 0, 1, 2)].tolist()
+        turns = rotations.wxyz_from_xyzw(turns_xyzw).tolist()
         for bone, (place, turn) in enumerate(zip(origins.tolist(), turns, strict=True)):
             impl.api._queue_scene_message(SetBonePositionMessage(impl.name, bone, tuple(place)))
             impl.api._queue_scene_message(SetBoneOrientationMessage(impl.name, bone, tuple(turn)))
@@ -138,20 +142,19 @@ def _joined(character: Character, skin: Skin) -> tuple[list[tuple[int, int]], li
     return joined, anchors
 
 
-def _corners(skin: Skin, row: int) -> IntArray:
-    """The vertices (m,) of a link's triangles and of those that touch them."""
-    found: IntArray = np.unique(_with_edge(skin.surface.triangles, skin.owners == row))
-    return found
+def _piece(skin: Skin, row: int) -> tuple[FloatArray, IntArray, IntArray]:
+    """A link's mesh with a rim around it: vertices (m, 3) in its frame, m; triangles (k, 3).
 
-
-def _piece(skin: Skin, row: int) -> tuple[FloatArray, IntArray]:
-    """The vertices (m, 3) in a link's frame, m, and the triangles (k, 3) of its mesh."""
-    triangles, used = _with_edge(skin.surface.triangles, skin.owners == row), _corners(skin, row)
-    vertices = skin.surface.vertices[used].copy()
-    around = ~np.isin(used, skin.surface.triangles[skin.owners == row])
-    vertices[around] -= _SUNK * skin.surface.normals[used][around]
+    Then the numbers (m,) that these vertices have in the whole skin.
+    """
+    triangles, own = skin.surface.triangles, skin.owners == row
+    is_inner = np.zeros(len(skin.surface.vertices), dtype=np.bool_)
+    is_inner[triangles[own]] = True
+    used, faces = np.unique(triangles[is_inner[triangles].any(axis=1)], return_inverse=True)
+    sunk = np.where(is_inner[used], 0.0, _SUNK)[:, np.newaxis]
+    vertices = skin.surface.vertices[used] - sunk * skin.surface.normals[used]
     back = rotations.conjugate(skin.turns_xyzw[row])
-    return rotations.rotate(back, vertices - skin.origins[row]), np.searchsorted(used, triangles)
+    return rotations.rotate(back, vertices - skin.origins[row]), faces.reshape(-1, 3), used
 
 
 def _weights(skin: Skin, vertices: IntArray, rows: Sequence[int]) -> FloatArray:
@@ -164,16 +167,3 @@ def _weights(skin: Skin, vertices: IntArray, rows: Sequence[int]) -> FloatArray:
     weights[total[:, 0] == 0.0, 0], total[total == 0.0] = 1.0, 1.0
     shares: FloatArray = weights / total
     return shares
-
-
-def _with_edge(triangles: IntArray, chosen: np.ndarray) -> IntArray:
-    """Of triangles (k, 3) those that are chosen, and all that touch them."""
-    touched = np.zeros(int(triangles.max()) + 1, dtype=np.bool_)
-    touched[triangles[chosen]] = True
-    found: IntArray = triangles[touched[triangles].any(axis=1)]
-    return found
-
-
-def _rgb(color: Quadruple) -> tuple[int, int, int]:
-    red, green, blue = (round(255.0 * part) for part in color[:3])
-    return red, green, blue
