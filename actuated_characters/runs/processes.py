@@ -31,7 +31,6 @@ MODULES = {
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
-_REPETITION = 2.0  # s after which a signal to a child is repeated
 _LAST_LINES = 3  # are told of a process that failed without saying why
 _PROGRESS = re.compile(r"(tick|flushed|state) [0-9]+$")  # lines for the parent, not for a reader
 _WARNING_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[0-9.]+\] \[[^]]*\]: (.+)")  # rcutils' form
@@ -69,6 +68,9 @@ class Child:
     """One process: its standard output can be read, its standard error goes to a log file."""
 
     signal_at_parents_end = signal.SIGTERM
+    patience_with_signal = 2.0
+    """s after which a signal is sent again: one that comes while Python begins can be lost.
+    A node ends in good order at the first one, and takes no notice of others."""
 
     def __init__(
         self,
@@ -167,16 +169,16 @@ class Child:
             self._process.send_signal(number)
 
     def end(self, request: signal.Signals | None = None, patience: float = _END_TIMEOUT) -> int:
-        """Send a signal if one is given, wait, kill after `patience` s; return the exit code.
+        """Send a signal if one is given, again if need be, and kill it after `patience` s.
 
-        The signal is sent again and again: one that comes while Python begins can be lost.
+        Returns the exit code.
         """
         deadline = time.monotonic() + patience
         while (left := deadline - time.monotonic()) > 0.0:
             if request is not None:
                 self.send(request)
             with suppress(subprocess.TimeoutExpired):
-                return self._process.wait(min(left, _REPETITION))
+                return self._process.wait(min(left, self.patience_with_signal))
         self._process.kill()
         return self._process.wait()
 

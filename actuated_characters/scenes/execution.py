@@ -45,7 +45,7 @@ def play_scene(
 
     def report(count: int) -> None:
         nonlocal done
-        done = count
+        done = max(done, count)  # a reset sets the count back
         progress(count)
 
     with run_environment(directory) as environment, Children(directory, environment) as children:

@@ -3,6 +3,7 @@
 Everything waits for a condition with a deadline; nothing sleeps to let something happen.
 """
 
+import math
 import os
 import signal
 import subprocess
@@ -81,6 +82,7 @@ class Process(Child):
     """A process with its output in files; `end` ends it, whatever happens."""
 
     signal_at_parents_end = signal.SIGKILL
+    patience_with_signal = math.inf  # a second one ends a command at once, amid its good order
 
     def __init__(
         self,
