@@ -44,9 +44,14 @@ _HEADERS = {
 }
 # The page of viser 1.1.1 fails, and stays empty, where a skinned mesh goes: as a character does, or
 # all as the viewer is started anew. Loaded once more it shows what is there.
-_LOADED_AGAIN = b"""<script>
+# The arrow keys would turn its camera, for which it listens at the document, and steer a character,
+# for which it listens one element below: there they stop.
+_ADDED_SCRIPT = b"""<script>
 addEventListener("error", event => {
   if (event.message.includes("reading 'remove'")) location.reload();
+});
+document.documentElement.addEventListener("keydown", event => {
+  if (event.code.startsWith("Arrow")) event.stopPropagation();
 });
 </script>"""
 _STARTING_PAGE = "the viewer starts; this page comes again by itself\n"
@@ -123,15 +128,15 @@ class ServerGate:
             if "Accept-Encoding" in request.headers:  # what is zipped could not be added to
                 del request.headers["Accept-Encoding"]
             page = serve(connection, request)
-            return page if page is None else _with_reload(page)
+            return page if page is None else _with_script(page)
         except Exception as error:  # a request that viser does not understand ends no connection
             self.reject(f"rejected a request: {error!r}")
             return respond(HTTPStatus.BAD_REQUEST, "this request is not understood\n")
 
 
-def _with_reload(response: Response) -> Response:
-    """A response, with what loads a page of it once more where that fails."""
-    body = response.body.replace(b"<head>", b"<head>" + _LOADED_AGAIN, 1)
+def _with_script(response: Response) -> Response:
+    """A response, with the script that is added to a page of it."""
+    body = response.body.replace(b"<head>", b"<head>" + _ADDED_SCRIPT, 1)
     if body != response.body:
         response.body = body
         del response.headers["Content-Length"]
