@@ -96,7 +96,7 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
     directory = (options.output or Path("runs") / f"play-{scene.name}").absolute()
     overwrite = options.overwrite or options.output is None
     prepare_directory(directory, overwrite=overwrite, characters=scene.characters)
-    viewer = None if options.no_view else server_parameters(options)
+    viewer = None if options.no_view else {**scene.viewer, **server_parameters(options)}
     check_interruption()  # all modules are imported by now
     last_megabytes = 0.0 if options.output else _LAST_MEGABYTES
     for line in (*_described(scene), _recorded_part(last_megabytes)):

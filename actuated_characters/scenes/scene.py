@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 
-SIMULATOR, CONTROLLER = "sim_node", "controller_node"
+SIMULATOR, CONTROLLER, VIEWER = "sim_node", "controller_node", "viewer"
 _FOLDER = Path(__file__).parent / "data"
 _SUFFIX = ".yaml"
 _PARAMETERS = "ros__parameters"
@@ -26,6 +26,7 @@ class Scene:
     name: str
     title: str  # what there is to see, in one line
     nodes: Mapping[str, Parameters]  # the simulator's first, by names below its namespace
+    viewer: Mapping[str, object] = field(default_factory=dict)  # parameters of the page
 
     @property
     def simulator(self) -> Parameters:
@@ -65,19 +66,29 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
         if not (isinstance(section, dict) and isinstance(section.get(_PARAMETERS), dict)):
             raise ConfigurationError(f"{path}: '{key}' must hold a mapping '{_PARAMETERS}'")
     settings = settings or {}
-    simulator = _parameters_of(SIMULATOR, content) | settings.get(SIMULATOR, {})
+    simulator = _beside(path, _parameters_of(SIMULATOR, content)) | settings.get(SIMULATOR, {})
     if not simulator:
         raise ConfigurationError(f"{path}: there are no parameters of '{SIMULATOR}'")
     nodes, names = {SIMULATOR: simulator}, _names_in(simulator)
     for character in names or [""]:
         node = f"{character}/{CONTROLLER}".lstrip("/")
-        nodes[node] = given = _parameters_of(node, content) | settings.get(CONTROLLER, {})
-        opponent = given.get(_OPPONENT, "")
+        given = _beside(path, _parameters_of(node, content)) | settings.get(CONTROLLER, {})
+        nodes[node], opponent = given, given.get(_OPPONENT, "")
         if opponent not in ("", *(name for name in names if name != character)):
             raise ConfigurationError(
                 f"{path}: '{_OPPONENT}' of '{node}' is {opponent}, which is no other character"
             )
-    return Scene(path.stem, _title(text), nodes)
+    return Scene(path.stem, _title(text), nodes, _parameters_of(VIEWER, content))
+
+
+def _beside(scene: Path, given: Parameters) -> Parameters:
+    """The parameters, with the names of files that lie beside the scene's as whole paths."""
+    return {
+        name: str(scene.parent.absolute() / value)
+        if isinstance(value, str) and value and (scene.parent / value).is_file()
+        else value
+        for name, value in given.items()
+    }
 
 
 def _title(text: str) -> str:

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from rclpy.node import Node
 
+from actuated_characters.viewer.drawing.name_tag import mode_of
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from msgs_config.bus.polling import DirectSubscription
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import LayoutError, MessageError
 from msgs_config.messages import topics
-from msgs_config.messages.cdr import read_frame_id
+from msgs_config.messages.cdr import decode_string, read_frame_id
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.projectiles import BallStates, ThrowCodec, decode_balls
 from msgs_config.messages.session import ANONYMOUS, read_session
@@ -76,11 +77,15 @@ class CharacterReader:
         self._reference = newest(topics.REFERENCE.of(topics.CONTROLLER_NODE))
         self._contacts = newest(topics.CONTACTS)
         self._pushes = newest(topics.APPLIED_WRENCH)
+        mode = topics.MODE.of(topics.CONTROLLER_NODE)
+        self._modes = DirectSubscription(node, replace(mode, name=f"{below}/{mode.name}"))
 
     def take(self) -> bool:
         """Take what has come into `sample`; whether there is a newer state."""
         sample = self.sample
         try:
+            while (raw := self._modes.take()) is not None:
+                sample.mode = mode_of(decode_string(raw))
             if (raw := self._contacts.take()) is not None:
                 sample.contacts = decode_wrenches(raw)
             if (raw := self._pushes.take()) is not None:
@@ -97,7 +102,7 @@ class CharacterReader:
 
     def close(self) -> None:
         """End the subscriptions."""
-        for each in (self._states, self._reference, self._contacts, self._pushes):
+        for each in (self._states, self._reference, self._contacts, self._pushes, self._modes):
             each.close()
 
 

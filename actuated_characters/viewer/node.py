@@ -9,10 +9,15 @@ from rclpy.node import Node
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.panel import ControlPanel, Subject
-from actuated_characters.viewer.controls.shown_parameters import ShownParameter, shown_parameters
+from actuated_characters.viewer.controls.shown_parameters import (
+    ShownParameter,
+    check_controls,
+    shown_parameters,
+)
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.parameters import PARAMETERS, ViewerSettings
+from actuated_characters.viewer.drawing.terrain import draw_terrain
+from actuated_characters.viewer.parameters import PARAMETERS, SHOWN, ViewerSettings
 from actuated_characters.viewer.simulators import WatchedNamespace, WatchedSimulators
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
@@ -25,7 +30,7 @@ from actuated_characters.viewer.web.server import (
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters
-from msgs_config.errors import ActuatedCharactersError
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of
 from msgs_config.messages import topics
 from msgs_config.parameters import resolve
 from msgs_config.runtime.process import StopSignal
@@ -51,6 +56,10 @@ class ViewerNode(Node):
         declare(self, PARAMETERS, values)
         settings = ViewerSettings.of(values)
         self._period = 1.0 / settings.fps
+        check_controls(settings.controls)
+        for name in settings.hidden:
+            if name not in SHOWN:
+                raise ConfigurationError(one_of("'hidden'", name, list(SHOWN)))
         self._once_logger = OnceLogger(self.get_logger())
         host = settings.host
         self._rejections = Rejections()
@@ -59,12 +68,18 @@ class ViewerNode(Node):
         self._scene = BrowserScene(self._server)
         self._actions = ActionQueue()
         self._hands = Hands(self, self._scene, self._actions)
-        self._panel = ControlPanel(self, self._server.gui, self._scene, self._hands, self._actions)
+        self._settings = settings
+        self._panel = ControlPanel(
+            self, self._server.gui, self._scene, self._hands, self._actions, settings
+        )
         self._simulators = WatchedSimulators(self, self.get_namespace().rstrip("/"), self._log)
         self._drawn: dict[str, LiveCharacter] = {}
         self._numbers: dict[str, int] = {}  # of the characters, by namespace, as they were found
         self._parameters: dict[str, Mapping[str, tuple[ShownParameter, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
+        self._terrains: dict[
+            str, str | None
+        ] = {}  # texts of URDFs, by the nodes' names in the scene
         self._framed: set[str] = set()  # the characters, by namespace, that the camera was set for
         self._announce(host, listening.getsockname()[1])
 
@@ -153,7 +168,14 @@ class ViewerNode(Node):
             for each in self._simulators.characters
             if each.below in self._drawn and each.reader is not None
         }
+        samples = {
+            each.below: each.reader.sample
+            for each in self._simulators.characters
+            if each.reader is not None
+        }
+        characters = {below: self._drawn[below].character for below in known}
         self._panel.update(known, self._stamps_ns())
+        self._panel.show_curves(characters, samples)
 
     def _stamps_ns(self) -> dict[str, int]:
         """Stamps of the newest states, by the characters' namespaces."""
@@ -175,13 +197,26 @@ class ViewerNode(Node):
         name = f"{WORLD}/characters{below}/{_LEAF}"
         bind = self._hands.bind(below, lambda: self._drawn.get(below))
         self._hands.open_topics(below, watched.simulator)
-        self._parameters[below] = shown_parameters(rebuilt.character)
+        self._parameters[below] = shown_parameters(rebuilt.character, self._settings.controls)
         try:
             with self._server.atomic():
                 number = self._numbers.setdefault(below, len(self._numbers))
                 self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind, number)
+                self._draw_terrain(watched)
         except ActuatedCharactersError as error:
             self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
+
+    def _draw_terrain(self, watched: WatchedNamespace) -> None:
+        """Draw the ground of a character's world as it is described now."""
+        assert watched.rebuilt is not None
+        terrain, name = watched.rebuilt.world.terrain, f"{WORLD}/terrain{watched.simulator}/shapes"
+        text = None if terrain is None else terrain.urdf_text
+        if self._terrains.get(name) == text:
+            return
+        self._terrains[name] = text
+        self._scene.api.remove_by_name(name)
+        if terrain is not None:
+            draw_terrain(self._scene.api, name, terrain)
 
     def _remove(self, below: str) -> None:
         if (drawn := self._drawn.pop(below, None)) is not None:

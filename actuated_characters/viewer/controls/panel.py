@@ -13,6 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.drive import DrivingControls
 from actuated_characters.viewer.controls.hands import Hands
+from actuated_characters.viewer.controls.live_curves import ShownCurves
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
@@ -21,8 +22,10 @@ from actuated_characters.viewer.controls.shown_parameters import (
     SIMULATOR,
     ShownParameter,
 )
-from actuated_characters.viewer.drawing.drawn_character import SHOWN
+from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene import BrowserScene
+from actuated_characters.viewer.parameters import SHOWN, ViewerSettings
+from msgs_config.character.model import Character
 from msgs_config.messages import topics
 
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
@@ -56,15 +59,18 @@ class ControlPanel:
         scene: BrowserScene,
         hands: Hands,
         actions: ActionQueue,
+        settings: ViewerSettings,
     ) -> None:
         self._gui, self._scene, self._hands, self._actions = gui, scene, hands, actions
         self.requests = Requests(node)
-        self.shows = dict.fromkeys(SHOWN, True)
+        self.shows = {name: name not in settings.hidden for name in SHOWN}
         self._subject = Subject("", "", "", "")
         self._next_text = 0.0
         self._names: tuple[str, ...] = ()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
+        if settings.about:
+            gui.add_markdown(settings.about)
         self._state = gui.add_markdown("no simulator")
         self._which: Any = gui.add_dropdown("Character", (_NAME_OF_ONLY_CHARACTER,), visible=False)
         self._add_run()
@@ -73,6 +79,7 @@ class ControlPanel:
         self._add_touch()
         self._add_shown()
         self._controls = ParameterControls(gui, self.requests, self._later, self.tell)
+        self._curves = ShownCurves(gui, self.requests, settings.curves)
 
     def _later(self, function: Callable[..., None], value: Callable[[], Any]) -> Callable[..., Any]:
         """A callback of viser that has the node's thread call a function with a value."""
@@ -106,7 +113,7 @@ class ControlPanel:
         gui = self._gui
         with gui.add_folder("Show", expand_by_default=False):
             for name, label in SHOWN.items():
-                box = gui.add_checkbox(label, initial_value=True)
+                box = gui.add_checkbox(label, initial_value=self.shows[name])
                 box.on_update(self._later(partial(self._show, name), _value_of(box)))
             follows = gui.add_checkbox("Follow", initial_value=True)
             follows.on_update(
@@ -145,6 +152,15 @@ class ControlPanel:
             text = f"**{as_text(chosen.character)}**  \n{1e-9 * stamp_ns:.2f} s"
             if self._state.content != text:
                 self._state.content = text
+
+    def show_curves(
+        self, characters: Mapping[str, Character], samples: Mapping[str, CharacterSample]
+    ) -> None:
+        """Draw the curves of the character that the panel is about, of these by namespaces."""
+        below = self._subject.below
+        if below in characters and below in samples:
+            controller = f"{below}/{topics.CONTROLLER_NODE}"
+            self._curves.show(controller, characters[below], samples[below])
 
     def _take_settings(self, values: dict[str, object]) -> None:
         factor, duration = values.get("real_time_factor"), values.get("wrench_duration")

@@ -1,5 +1,7 @@
 """Which parameters of the nodes the panel has, and as what it shows them."""
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS
@@ -7,11 +9,12 @@ from controller_node.control_laws import LAWS
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.clips.reading import available_clips
+from msgs_config.errors import ConfigurationError
 from msgs_config.messages import topics
 
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
 
-AT_RESET = "At the next reset"
+TO_TRY, AT_RESET = "To try", "At the next reset"
 
 _FORCE, _TORQUE = f"effort_limit.{ROOT}", f"effort_limit.{ROOT_TORQUE}"
 
@@ -59,8 +62,41 @@ _WORLD = (
 )
 
 
-def shown_parameters(character: Character) -> dict[str, tuple[ShownParameter, ...]]:
-    """Those of a character's nodes, by the titles of the panel's folders."""
+def parse_slider(text: str) -> ShownParameter:
+    """The slider of a text `NODE.NAME LEAST MOST STEP LABEL`.
+
+    Raises:
+        ConfigurationError: the text is none of that form.
+    """
+    name, *numbers = text.split(None, 4)
+    label = numbers.pop() if len(numbers) == 4 else ""
+    node, _, parameter = name.partition(".")
+    with suppress(ValueError):
+        least, most, step = map(float, numbers)
+        if node in (SIMULATOR, CONTROLLER) and parameter and label and 0.0 < step <= most - least:
+            return ShownParameter(parameter, label, range=(least, most, step), nodes=(node,))
+    raise ConfigurationError(
+        f"control '{text}': write it as '{CONTROLLER}.law', of a parameter that the page has, or "
+        f"as '{CONTROLLER}.gain_scale.p 0 3 0.05 Stiffness', a slider: least, most, step, label"
+    )
+
+
+def check_controls(texts: Sequence[str]) -> None:
+    """Raise ConfigurationError if a text is none that `shown_parameters` takes."""
+    for text in texts:
+        if len(text.split()) != 1:
+            parse_slider(text)
+
+
+def shown_parameters(
+    character: Character, first: Sequence[str] = ()
+) -> dict[str, tuple[ShownParameter, ...]]:
+    """Those of a character's nodes, by the titles of the panel's folders.
+
+    Args:
+        character: Whose joints and clips there are.
+        first: Those that come first: sliders, see `parse_slider`, or NODE.NAME of other ones.
+    """
     motion = [ShownParameter("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
     if clips := available_clips(character):
         motion.insert(
@@ -72,4 +108,16 @@ def shown_parameters(character: Character) -> dict[str, tuple[ShownParameter, ..
         if name not in character.layout.followers
         if name not in (ROOT, ROOT_TORQUE)
     )
-    return {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
+    folders = {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
+    known = {f"{each.nodes[0]}.{each.name}": each for own in folders.values() for each in own}
+    own = [
+        parse_slider(text) if len(text.split()) > 1 else known[text]
+        for text in first
+        if len(text.split()) > 1 or text in known
+    ]
+    names = {each.name for each in own}
+    others = {
+        title: tuple(each for each in parameters if each.name not in names)
+        for title, parameters in folders.items()
+    }
+    return {TO_TRY: tuple(own), **others} if own else others

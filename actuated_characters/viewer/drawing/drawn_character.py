@@ -16,6 +16,7 @@ from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
 from actuated_characters.viewer.drawing.support import support_polygon
+from actuated_characters.viewer.parameters import SHOWN
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
@@ -33,15 +34,6 @@ _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
 _MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least
 _ABOVE_GROUND = 0.004  # m, height of what is drawn on the ground
 _GRAVITY = 9.81
-
-SHOWN = {
-    "reference": "Reference",
-    "forces": "Contacts and pushes",
-    "balance": "Centre of mass and support",
-    "torques": "Torques against limits",
-    "skin": "Skin",
-}
-"""What is drawn beside the character itself, and what the panel calls it."""
 
 LinkMesh = viser.MeshHandle | viser.MeshSkinnedHandle
 
@@ -140,7 +132,7 @@ class DrawnCharacter:
         All are below a frame that goes along with the root: a page changes the points of lines and
         arrows later than the places of frames.
         """
-        name = f"{name}/marks"
+        self.marks = name = f"{name}/marks"
         self._marks = scene.add_frame(name, show_axes=False)
         self._marked: FloatArray = np.zeros(3)  # where that frame is, m, world
         self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
@@ -185,12 +177,25 @@ class DrawnCharacter:
         return root
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """The least and the greatest corner (3,) of a box around all its shapes, m, world."""
+        """The least and the greatest corner (3,) of a box around all its shapes, m, world.
+
+        Of a fixed base the box has room for the rest pose, too, and for where it stands.
+        """
+        if self.character.layout.has_floating_base:
+            return self._spheres(self.origins, self.turns_xyzw).bounds(np.eye(3))
+        place = self.character.placement
+        at_rest = self._poses(np.array(self.character.rest_position))
+        foot = Spheres(np.array([[place.x, place.y, place.z]]), np.zeros(1))
+        around = self._spheres(self.origins, self.turns_xyzw), self._spheres(*at_rest), foot
+        return Spheres.joined(around).bounds(np.eye(3))
+
+    def _spheres(self, origins: FloatArray, turns_xyzw: FloatArray) -> Spheres:
+        """Spheres around the shapes of links at these poses (l, 3), (l, 4), world."""
         placed = [
-            Spheres(self.origins[row] + rotations.rotate(self.turns_xyzw[row], local), radii)
+            Spheres(origins[row] + rotations.rotate(turns_xyzw[row], local), radii)
             for row, (local, radii) in enumerate(self._around)
         ]
-        return Spheres.joined(placed).bounds(np.eye(3))
+        return Spheres.joined(placed)
 
     def remove(self) -> None:
         """Remove all nodes."""

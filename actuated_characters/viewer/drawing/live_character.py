@@ -3,7 +3,11 @@
 import viser
 
 from actuated_characters.bags.rebuilding import Rebuilt
+from actuated_characters.metrics.falls import reader_for
 from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharacter
+from actuated_characters.viewer.drawing.name_tag import NameTag
+from actuated_characters.viewer.drawing.sample import CharacterSample
+from msgs_config.shared_parameters import NO_GROUND
 
 
 class LiveCharacter(DrawnCharacter):
@@ -16,6 +20,22 @@ class LiveCharacter(DrawnCharacter):
         limits = rebuilt.known.effort_limits
         super().__init__(scene, name, rebuilt.character, limits, bind, number)
         self.rebuilt = rebuilt
+        self._tag: NameTag | None = None
+        if rebuilt.world.name:  # one of several
+            can_fall = rebuilt.known.parameters.get("gravity", 1.0) and not self._is_in_air
+            reader = reader_for(rebuilt.character, rebuilt.world.terrain) if can_fall else None
+            self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader)
+
+    @property
+    def _is_in_air(self) -> bool:
+        """Whether there is no ground in its world."""
+        return bool(self.rebuilt.known.parameters.get("terrain") == NO_GROUND)
+
+    def draw(self, sample: CharacterSample) -> None:
+        """Move everything to where it is now."""
+        super().draw(sample)
+        if self._tag is not None and sample.state is not None:
+            self._tag.draw(sample.state, self.origins, sample.mode)
 
     def take(self, rebuilt: Rebuilt) -> bool:
         """Take another description if it looks alike; whether it does."""

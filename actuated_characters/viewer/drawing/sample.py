@@ -15,3 +15,4 @@ class CharacterSample:
     reference: FloatArray | None = None  # (n,) position, message form
     contacts: WrenchArrays | None = None
     pushes: WrenchArrays | None = None
+    mode: str = ""  # of the behaviour, as the controller has told it

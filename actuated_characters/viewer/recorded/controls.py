@@ -8,8 +8,8 @@ import viser
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
-from actuated_characters.viewer.drawing.drawn_character import SHOWN
 from actuated_characters.viewer.drawing.scene import BrowserScene
+from actuated_characters.viewer.parameters import SHOWN
 from actuated_characters.viewer.recorded.timeline import Playback
 
 NO_GHOST, REFERENCE = "none", "reference"
