@@ -193,5 +193,7 @@ def one_browser(folder: Path, *options: str) -> Iterator[Browser]:
     with lock.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         browser = Browser(folder, *options)
-        yield browser
-        browser.close()
+        try:
+            yield browser
+        finally:
+            browser.close()
