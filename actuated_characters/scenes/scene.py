@@ -8,15 +8,24 @@ from pathlib import Path
 from msgs_config import files
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.file_kinds import refuse_other_kind
+from msgs_config.shared_parameters import CharacterSource, SharedSettings
 
 SIMULATOR, CONTROLLER, VIEWER = "sim_node", "controller_node", "viewer"
 _FOLDER = Path(__file__).parent / "data"
 _SUFFIX = ".yaml"
+Parameters = dict[str, object]
+
 _PARAMETERS = "ros__parameters"
 _ANY_NAMESPACE = "/**"
 _OPPONENT = "opponent"
-
-Parameters = dict[str, object]
+_DEFAULTS: Parameters = {
+    "rate": 240,  # Hz
+    "real_time_factor": 1.0,
+    "wrench_duration": 0.05,  # s; short, so that a drag follows the pointer
+    "ball_lifetime": 20.0,  # s
+}
+_OF_CHARACTER = tuple(each.name for each in CharacterSource.declared())
+_OF_BOTH = tuple(each.name for each in SharedSettings.declared())
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,8 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
     """A scene that comes with the package, or that of a parameter file.
 
     Args:
-        name: The scene's name, or the path of a .yaml file as the executable `composed` takes it.
+        name: The scene's name, or the path of a .yaml file of parameters by the nodes' names. What
+            both sides must agree on needs to be said of the simulator alone.
         settings: Parameters in place of the file's: those of `sim_node`, and those of
             `controller_node`, which count for every controller.
 
@@ -66,19 +76,30 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
         if not (isinstance(section, dict) and isinstance(section.get(_PARAMETERS), dict)):
             raise ConfigurationError(f"{path}: '{key}' must hold a mapping '{_PARAMETERS}'")
     settings = settings or {}
-    simulator = _beside(path, _parameters_of(SIMULATOR, content)) | settings.get(SIMULATOR, {})
-    if not simulator:
+    given = _beside(path, _parameters_of(SIMULATOR, content)) | settings.get(SIMULATOR, {})
+    if not given:
         raise ConfigurationError(f"{path}: there are no parameters of '{SIMULATOR}'")
+    simulator = _DEFAULTS | given
     nodes, names = {SIMULATOR: simulator}, _names_in(simulator)
     for character in names or [""]:
         node = f"{character}/{CONTROLLER}".lstrip("/")
-        given = _beside(path, _parameters_of(node, content)) | settings.get(CONTROLLER, {})
-        nodes[node], opponent = given, given.get(_OPPONENT, "")
+        given = _agreed(simulator, character) | _beside(path, _parameters_of(node, content))
+        nodes[node] = given = given | settings.get(CONTROLLER, {})
+        opponent = given.get(_OPPONENT, "")
         if opponent not in ("", *(name for name in names if name != character)):
             raise ConfigurationError(
                 f"{path}: '{_OPPONENT}' of '{node}' is {opponent}, which is no other character"
             )
     return Scene(path.stem, _title(text), nodes, _parameters_of(VIEWER, content))
+
+
+def _agreed(simulator: Parameters, character: str) -> Parameters:
+    """What a character's controller must agree on with the simulator, as far as that is told it."""
+    own = {name: simulator[name] for name in (*_OF_CHARACTER, *_OF_BOTH) if name in simulator}
+    below = f"{character}." if character else ""
+    return own | {
+        name: simulator[below + name] for name in _OF_CHARACTER if below + name in simulator
+    }
 
 
 def _beside(scene: Path, given: Parameters) -> Parameters:

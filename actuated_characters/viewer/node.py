@@ -173,9 +173,8 @@ class ViewerNode(Node):
             for each in self._simulators.characters
             if each.reader is not None
         }
-        characters = {below: self._drawn[below].character for below in known}
         self._panel.update(known, self._stamps_ns())
-        self._panel.show_curves(characters, samples)
+        self._panel.show_curves(self._drawn, samples)
 
     def _stamps_ns(self) -> dict[str, int]:
         """Stamps of the newest states, by the characters' namespaces."""

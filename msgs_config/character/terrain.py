@@ -40,6 +40,11 @@ def terrain_shapes(loading: UrdfOptions) -> list[Shape]:
     return shapes
 
 
+def is_plane(shape: Shape) -> bool:
+    """Whether a terrain's shape stands for a plane."""
+    return shape.type is ShapeType.BOX and shape.size == _PLANE_EDGES
+
+
 def _link_frames(robot: ElementTree.Element) -> dict[str, Pose]:
     """Where each link is, by its name, in the URDF's own lengths."""
     joints = {joint_end(joint, "child"): joint for joint in robot.findall("joint")}

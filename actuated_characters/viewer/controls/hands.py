@@ -10,7 +10,13 @@ import viser
 from rclpy.node import Node
 
 from actuated_characters.viewer.controls.actions import ActionQueue
-from actuated_characters.viewer.controls.touch import STIFFNESS, Drag, aim_throw, spring_force
+from actuated_characters.viewer.controls.touch import (
+    STIFFNESS,
+    Drag,
+    aim_throw,
+    pour_balls,
+    spring_force,
+)
 from actuated_characters.viewer.drawing.drawn_character import Bind, LinkMesh
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
@@ -50,6 +56,14 @@ class Hands:
         if name not in self._publishers:
             self._publishers[name] = create_publisher(self._node, replace(topic, name=name))
         return self._publishers[name]
+
+    def pour(self, character: LiveCharacter) -> None:
+        """Let balls fall on a character."""
+        world, session = character.rebuilt.world, character.rebuilt.known.session
+        simulator = f"/{world.namespace}" if world.namespace else ""
+        for throw in pour_balls(character.root, self.ball_mass):
+            encoded = ThrowCodec(session).encode(0, throw)
+            self._publisher(simulator, topics.THROW).publish(encoded)
 
     def bind(self, below: str, drawn: Callable[[], LiveCharacter | None]) -> Bind:
         """Let the links of a character, as it is drawn then, be dragged and clicked on."""

@@ -22,10 +22,10 @@ from actuated_characters.viewer.controls.shown_parameters import (
     SIMULATOR,
     ShownParameter,
 )
+from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from actuated_characters.viewer.parameters import SHOWN, ViewerSettings
-from msgs_config.character.model import Character
 from msgs_config.messages import topics
 
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
@@ -65,6 +65,7 @@ class ControlPanel:
         self.requests = Requests(node)
         self.shows = {name: name not in settings.hidden for name in SHOWN}
         self._subject = Subject("", "", "", "")
+        self._characters: Mapping[str, LiveCharacter] = {}
         self._next_text = 0.0
         self._names: tuple[str, ...] = ()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
@@ -108,6 +109,13 @@ class ControlPanel:
             ):
                 slider = gui.add_slider(label, *limits, initial_value=float(getattr(hands, name)))
                 slider.on_update(self._later(partial(setattr, hands, name), _value_of(slider)))
+            pour = gui.add_button("Pour balls", hint="twenty of the mass above, over the character")
+            pour.on_click(self._later(self._pour, lambda: self._subject.below))
+
+    def _pour(self, below: str) -> None:
+        character = self._characters.get(below)
+        if character is not None:
+            self._hands.pour(character)
 
     def _add_shown(self) -> None:
         gui = self._gui
@@ -154,13 +162,13 @@ class ControlPanel:
                 self._state.content = text
 
     def show_curves(
-        self, characters: Mapping[str, Character], samples: Mapping[str, CharacterSample]
+        self, characters: Mapping[str, LiveCharacter], samples: Mapping[str, CharacterSample]
     ) -> None:
         """Draw the curves of the character that the panel is about, of these by namespaces."""
-        below = self._subject.below
+        self._characters, below = characters, self._subject.below
         if below in characters and below in samples:
             controller = f"{below}/{topics.CONTROLLER_NODE}"
-            self._curves.show(controller, characters[below], samples[below])
+            self._curves.show(controller, characters[below].character, samples[below])
 
     def _take_settings(self, values: dict[str, object]) -> None:
         factor, duration = values.get("real_time_factor"), values.get("wrench_duration")

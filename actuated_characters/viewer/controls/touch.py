@@ -14,6 +14,11 @@ from msgs_config.messages.throw import ProjectileThrow, natural_radius
 
 STIFFNESS, LIMIT = 400.0, 1000.0  # N/m, N
 
+POURED = 20  # balls that are poured at once
+
+_COLUMNS = 2  # along each edge of the block of balls that are poured
+_POURED_ABOVE = 1.2  # m, from a root to the lowest ball
+_SPACING = 2.4  # radii, between the centres of two
 _DISTANCE = 2.0  # m, from where a ball begins to where it was clicked
 _FROM_CAMERA = 0.3  # m: no ball begins nearer to the camera, or behind it
 _LEAST_DISTANCE = 0.3  # m
@@ -56,6 +61,26 @@ class Drag:
         if before is None or stamp_ns <= before:
             return 0.0
         return 1e-9 * (stamp_ns - before)
+
+
+def pour_balls(root: FloatArray, mass: float) -> list[ProjectileThrow]:
+    """Balls that fall on a root (3,), m, world, of a mass each, kg: a block of `POURED` above it.
+
+    No two touch, and each layer is turned against the one below, so that they scatter.
+
+    Raises:
+        CommandError: the mass is beyond what a throw can have.
+    """
+    radius = natural_radius(mass)
+    throws = []
+    for number in range(POURED):
+        layer, place = divmod(number, _COLUMNS**2)
+        angle = 0.7 * layer + 0.5 * np.pi * place
+        across = _SPACING * radius * 2.0**-0.5
+        x, y = root[:2] + across * np.array((np.cos(angle), np.sin(angle)))
+        z = root[2] + _POURED_ABOVE + _SPACING * radius * layer
+        throws.append(ProjectileThrow(mass, radius, (float(x), float(y), float(z)), (0.0,) * 3))
+    return throws
 
 
 def aim_throw(

@@ -5,19 +5,21 @@ import viser
 
 from actuated_characters.render.engine.shape_meshes import surface_of
 from msgs_config.character.model import UrdfOptions
-from msgs_config.character.terrain import terrain_shapes
+from msgs_config.character.terrain import is_plane, terrain_shapes
 from msgs_config.geometry import rotations
 
 _COLOR = (164, 176, 194)
 
 
 def draw_terrain(scene: viser.SceneApi, name: str, terrain: UrdfOptions) -> None:
-    """Add a terrain's shapes below a name in the scene.
+    """Add a terrain's shapes below a name in the scene; the ground is there for its planes.
 
     Raises:
         CharacterError: the URDF or a mesh of it cannot be used; names the file.
     """
     for number, shape in enumerate(terrain_shapes(terrain)):
+        if is_plane(shape):
+            continue
         vertices, _, faces = surface_of(shape)
         scene.add_mesh_simple(
             f"{name}/{number}",

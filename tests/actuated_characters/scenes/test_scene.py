@@ -15,7 +15,7 @@ def test_the_list_has_a_line_for_each_scene(capsys: pytest.CaptureFixture[str]) 
 
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(": ")[0] for line in lines] == scene_names()
-    assert all(line.split(": ")[1].endswith(".") for line in lines)
+    assert all(line.partition(": ")[2].endswith(".") for line in lines)
     assert {"brawl", "walker"} <= set(scene_names())
 
 
@@ -46,8 +46,9 @@ def test_a_file_is_read_as_rcl_reads_it_and_settings_count_more(tmp_path: Path) 
     assert (scene.name, scene.title, scene.characters) == ("mine", "Mine.", ["a", "b"])
     assert list(scene.nodes) == ["sim_node", "a/controller_node", "b/controller_node"]
     assert scene.simulator["a.character"] == "lift"
-    assert scene.nodes["a/controller_node"] == {"rate": 480, "gains.hinge.p": 1.0, "law": "zero"}
-    assert scene.nodes["b/controller_node"] == {"rate": 240, "gains.hinge.p": 1.0, "law": "zero"}
+    own = {"gains.hinge.p": 1.0, "law": "zero"}
+    assert scene.nodes["a/controller_node"] == {"character": "lift", "rate": 480, **own}
+    assert scene.nodes["b/controller_node"] == {"rate": 240, **own}
 
 
 @pytest.mark.parametrize(
