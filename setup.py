@@ -35,7 +35,7 @@ setup(
             "behaviours/state_machine/data/*.yaml",
             "planner/policy/shipped/*.npz",
         ],
-        "actuated_characters": ["scenes/data/*.yaml"],
+        "actuated_characters": ["scenes/*.yaml", "scenes/data/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

@@ -25,6 +25,8 @@ if TYPE_CHECKING:  # it takes a while to import
 
 _SCENE = "walker"
 _DURATION = 600.0  # s
+_MOST_COLUMNS = 4  # characters whose figures are shown beside each other
+_FIGURES_OF_MANY = ("sim_time_s", "real_time_factor", "fell", "joint_error_mean_rad")
 _LAST_MEGABYTES = 150.0  # MB, the least that is kept of a scene without --output
 
 
@@ -38,7 +40,7 @@ def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:
         "Play a scene in real time in a browser: drag a body to push it, click on it with Shift to "
         "throw a ball at it. Ctrl-C ends it. The last minutes are recorded, or with --output all. "
         "Needs the extra 'view'.",
-        ["play", "play --scene brawl"],
+        ["play", "play --scene brawl", "play --lecture"],
     )
     play.add_argument(
         "--scene",
@@ -47,6 +49,11 @@ def add_play(commands: "Commands[argparse.ArgumentParser]") -> None:
         help="which (%(default)s; --list says what there is), or a .yaml file of parameters",
     )
     play.add_argument("--list", action="store_true", help="list the scenes, a line each, and end")
+    play.add_argument(
+        "--lecture",
+        action="store_true",
+        help="list the lecture's slides with the scenes and studies of each, and end",
+    )
     play.add_argument(
         "--duration",
         type=float,
@@ -79,9 +86,23 @@ def _play(options: argparse.Namespace) -> None:
         for name in scene_names():
             print(f"{name}: {load_scene(name).title}")
         return
+    if options.lecture:
+        _print_lecture()
+        return
     if not options.no_view:
         require_extra("view", "play (without --no-view)")
     _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
+
+
+def _print_lecture() -> None:
+    from actuated_characters.scenes.slides import lecture_slides
+
+    rows = [
+        (each.numbers, each.content, "\n".join(each.commands) or each.why)
+        for each in lecture_slides()
+    ]
+    title = "Actuating Simulated Characters; each command after: actuated_characters"
+    Console().print(make_table(title, ("slides", "content", "to run"), rows, right=False))
 
 
 def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
@@ -149,6 +170,10 @@ def _print_figures(directory: Path, characters: list[str]) -> None:
         plot_metrics(folder)
         for figure, value in describe_metrics(read_metrics(folder)[0]):
             shown.setdefault(figure, []).append(value)
-    columns = ("figure", *(characters or ["value"]))
-    rows = [(figure, *values) for figure, values in shown.items()]
+    columns: tuple[str, ...] = ("figure", *(characters or ["value"]))
+    rows: list[tuple[str, ...]] = [(figure, *values) for figure, values in shown.items()]
+    if len(characters) > _MOST_COLUMNS:  # a row each, and the rest is in the directory
+        columns = ("character", *_FIGURES_OF_MANY)
+        each = zip(characters, *(shown[name] for name in _FIGURES_OF_MANY), strict=True)
+        rows = list(each)
     Console().print(make_table(f"results in {directory}", columns, rows))

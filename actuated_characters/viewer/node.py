@@ -27,6 +27,7 @@ from actuated_characters.viewer.web.server import (
     start_server,
     stop_server,
 )
+from msgs_config.arrays import FloatArray
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters
@@ -77,9 +78,8 @@ class ViewerNode(Node):
         self._numbers: dict[str, int] = {}  # of the characters, by namespace, as they were found
         self._parameters: dict[str, Mapping[str, tuple[ShownParameter, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
-        self._terrains: dict[
-            str, str | None
-        ] = {}  # texts of URDFs, by the nodes' names in the scene
+        # by names in the scene: texts of URDFs, and the corners (k, 3), m
+        self._terrains: dict[str, tuple[str, FloatArray]] = {}
         self._framed: set[str] = set()  # the characters, by namespace, that the camera was set for
         self._announce(host, listening.getsockname()[1])
 
@@ -144,7 +144,8 @@ class ViewerNode(Node):
         drawn = {below for below, each in self._drawn.items() if each.has_been_drawn}
         if drawn == set(self._drawn) and not drawn <= self._framed:
             self._framed |= drawn
-            self._scene.frame_characters(list(self._drawn.values()))
+            corners = [corners for _, corners in self._terrains.values()]
+            self._scene.frame_characters(list(self._drawn.values()), corners)
 
     def _draw(self, watched: WatchedNamespace) -> None:
         if watched.is_new_episode and watched.simulator in self._balls:
@@ -209,13 +210,13 @@ class ViewerNode(Node):
         """Draw the ground of a character's world as it is described now."""
         assert watched.rebuilt is not None
         terrain, name = watched.rebuilt.world.terrain, f"{WORLD}/terrain{watched.simulator}/shapes"
-        text = None if terrain is None else terrain.urdf_text
-        if self._terrains.get(name) == text:
+        text = "" if terrain is None else terrain.urdf_text
+        if text == (self._terrains[name][0] if name in self._terrains else ""):
             return
-        self._terrains[name] = text
         self._scene.api.remove_by_name(name)
+        self._terrains.pop(name, None)
         if terrain is not None:
-            draw_terrain(self._scene.api, name, terrain)
+            self._terrains[name] = text, draw_terrain(self._scene.api, name, terrain)
 
     def _remove(self, below: str) -> None:
         if (drawn := self._drawn.pop(below, None)) is not None:

@@ -12,6 +12,7 @@ from viser import uplot
 from actuated_characters.viewer.controls.expected_motion import ExpectedMotion
 from actuated_characters.viewer.controls.requests import Requests
 from actuated_characters.viewer.drawing.sample import CharacterSample
+from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
 _WINDOW = 8.0  # s that a curve shows
@@ -27,6 +28,7 @@ class ShownCurves:
     def __init__(self, gui: viser.GuiApi, requests: Requests, names: Sequence[str]) -> None:
         """Show degrees of freedom of these names, of those that the character has."""
         self._gui, self._requests, self._names = gui, requests, names
+        self._folder = gui.add_folder("Over time", visible=bool(names))
         self._character: Character | None = None
         self._expected: ExpectedMotion | None = None
         self._points: dict[str, deque[tuple[float, float, float, float]]] = {}
@@ -83,17 +85,21 @@ class ShownCurves:
             if name in self._plots:
                 self._plots[name].data = data
             elif len(points) > 1:
-                self._plots[name] = self._gui.add_uplot(
-                    data,
-                    (
-                        uplot.Series(label="s"),
-                        *(
-                            uplot.Series(label=label, stroke=color, width=2)
-                            for label, color in _COLOURS.items()
-                        ),
+                self._plots[name] = self._add_plot(name, data)
+
+    def _add_plot(self, title: str, data: tuple[FloatArray, ...]) -> Any:
+        with self._folder:
+            return self._gui.add_uplot(
+                data,
+                (
+                    uplot.Series(label="s"),
+                    *(
+                        uplot.Series(label=label, stroke=color, width=2)
+                        for label, color in _COLOURS.items()
                     ),
-                    title=name,
-                    scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-                    legend=uplot.Legend(show=True),
-                    aspect=_ASPECT,
-                )
+                ),
+                title=title,
+                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
+                legend=uplot.Legend(show=True),
+                aspect=_ASPECT,
+            )

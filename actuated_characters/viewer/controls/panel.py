@@ -76,11 +76,12 @@ class ControlPanel:
         self._which: Any = gui.add_dropdown("Character", (_NAME_OF_ONLY_CHARACTER,), visible=False)
         self._add_run()
         self._told = gui.add_markdown(_HELP)
+        self._curves = ShownCurves(gui, self.requests, settings.curves)
+        order = self._told.order + 0.5  # of the controls that a scene has first
         self._drive = DrivingControls(node, gui, actions)
         self._add_touch()
         self._add_shown()
-        self._controls = ParameterControls(gui, self.requests, self._later, self.tell)
-        self._curves = ShownCurves(gui, self.requests, settings.curves)
+        self._controls = ParameterControls(gui, self.requests, self._later, self.tell, order)
 
     def _later(self, function: Callable[..., None], value: Callable[[], Any]) -> Callable[..., Any]:
         """A callback of viser that has the node's thread call a function with a value."""

@@ -8,7 +8,12 @@ from typing import Any
 import viser
 
 from actuated_characters.viewer.controls.requests import Requests
-from actuated_characters.viewer.controls.shown_parameters import AT_RESET, SIMULATOR, ShownParameter
+from actuated_characters.viewer.controls.shown_parameters import (
+    AT_RESET,
+    SIMULATOR,
+    TO_TRY,
+    ShownParameter,
+)
 
 Later = Callable[[Callable[..., None], Callable[[], Any]], Callable[..., Any]]
 
@@ -17,8 +22,15 @@ class ParameterControls:
     """Folders of controls, each of one parameter; hidden where the node has none."""
 
     def __init__(
-        self, gui: viser.GuiApi, requests: Requests, later: Later, tell: Callable[[str], None]
+        self,
+        gui: viser.GuiApi,
+        requests: Requests,
+        later: Later,
+        tell: Callable[[str], None],
+        order: float | None = None,
     ) -> None:
+        """`order` is where a scene's own folder stands on the panel; others stand at its end."""
+        self._order = order
         self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
         self._nodes: dict[str, str] = {}  # whole names of nodes by those in the contract
         self._prefix = ""  # begins the names of the character's own parameters of its simulator
@@ -48,7 +60,10 @@ class ParameterControls:
             folder.remove()
         self._folders, self._controls = {}, {}
         for title, parameters in self._shown.items():
-            folder = self._gui.add_folder(title, visible=False, expand_by_default=not self._folders)
+            is_first, order = not self._folders, self._order if title == TO_TRY else None
+            folder = self._gui.add_folder(
+                title, visible=False, expand_by_default=is_first, order=order
+            )
             self._folders[title] = folder
             with folder:
                 for shown in parameters:

@@ -68,7 +68,7 @@ def parse_slider(text: str) -> ShownParameter:
     Raises:
         ConfigurationError: the text is none of that form.
     """
-    name, *numbers = text.split(None, 4)
+    name, *numbers = text.split(None, 4) or [""]
     label = numbers.pop() if len(numbers) == 4 else ""
     node, _, parameter = name.partition(".")
     with suppress(ValueError):

@@ -66,6 +66,7 @@ class DrawnCharacter:
         """
         self.character, self.name, self.effort_limits = character, name, effort_limits
         self._scene, self._model = scene, DynamicsModel(character)
+        self._all = scene.add_frame(name, show_axes=False, visible=False)  # until it is drawn
         shapes = drawn_shapes(character)
         self._outlines = [_around(link.collision_shapes) for link in character.links]
         self._around = [_around(own) for own in shapes]
@@ -205,7 +206,8 @@ class DrawnCharacter:
         """Move everything to where it is now."""
         if sample.state is None:
             return
-        self.has_been_drawn = True
+        if not self.has_been_drawn:
+            self._all.visible = self.has_been_drawn = True
         self._draw_ghost(sample.reference if self.shows["reference"] else None)
         self.origins, self.turns_xyzw = self._poses(sample.state.position)
         set_poses(self._frames, self.origins, self.turns_xyzw)

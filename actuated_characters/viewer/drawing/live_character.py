@@ -1,12 +1,14 @@
 """A drawn character of a simulator that runs."""
 
+import numpy as np
 import viser
 
 from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.metrics.falls import reader_for
 from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharacter
-from actuated_characters.viewer.drawing.name_tag import NameTag
+from actuated_characters.viewer.drawing.name_tag import TAG_HEIGHT, NameTag
 from actuated_characters.viewer.drawing.sample import CharacterSample
+from msgs_config.arrays import FloatArray
 from msgs_config.shared_parameters import NO_GROUND
 
 
@@ -25,6 +27,11 @@ class LiveCharacter(DrawnCharacter):
             can_fall = rebuilt.known.parameters.get("gravity", 1.0) and not self._is_in_air
             reader = reader_for(rebuilt.character, rebuilt.world.terrain) if can_fall else None
             self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader)
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """The corners (3,) of a box around it, m, world, with room for what stands above it."""
+        low, high = super().bounds()
+        return low, high + (0.0 if self._tag is None else TAG_HEIGHT) * np.array((0.0, 0.0, 1.0))
 
     @property
     def _is_in_air(self) -> bool:

@@ -10,6 +10,8 @@ from actuated_characters.metrics.falls import FALLEN_TIME, PostureReader, Postur
 from msgs_config.arrays import FloatArray
 from msgs_config.messages.state import StampedState
 
+TAG_HEIGHT = 0.3  # m, that a text needs above a character
+
 _ABOVE = 0.25  # m, from the highest link's frame to the text
 _UNTOLD = "TRACK"  # the mode in which nothing happens to a character
 _UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)

@@ -30,6 +30,7 @@ BACKGROUND, LIGHT_TILE, DARK_TILE = (
 EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
 """Of the camera until a character is there, m, from the point on the ground below."""
 
+_RIGHT: FloatArray = np.array((0.5**0.5, 0.5**0.5, 0.0))  # of a view from there
 _FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
 _SHARE = 0.62  # of the view's height that characters take
 _WIDTH_OF_HEIGHT = 1.1  # of the view, beside the panel
@@ -89,13 +90,19 @@ class BrowserScene:
         near, far = (share * distance for share in _HAZE)
         self.api.configure_fog(near, far, color=_HAZE_COLOR)
 
-    def frame_characters(self, characters: Sequence[DrawnCharacter]) -> None:
-        """Have all pages see the characters where they are now, as large as fits."""
+    def frame_characters(
+        self, characters: Sequence[DrawnCharacter], others: Sequence[FloatArray] = ()
+    ) -> None:
+        """Have all pages see the characters where they are now, as large as fits.
+
+        So are other points (k, 3), m, world.
+        """
         if not characters:
             return
-        low = np.min([each.bounds()[0] for each in characters], axis=0)
-        high = np.max([each.bounds()[1] for each in characters], axis=0)
-        across = float(np.hypot(*(high - low)[:2]))
+        boxes = [_corners(*each.bounds()) for each in characters]
+        corners = np.concatenate([*boxes, *others])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        across = float(np.ptp(corners @ _RIGHT))
         size = max(float(high[2] - low[2]), across / _WIDTH_OF_HEIGHT)
         away = 0.5 * size / (_SHARE * np.tan(0.5 * _FIELD_OF_VIEW))
         followed = self._followed(characters)
@@ -127,6 +134,12 @@ class BrowserScene:
         # the ground moves along by pairs of tiles, or the characters would walk off it
         pair = 2.0 * self._tile
         self._ground.position = (*(pair * np.round(self.offset[:2] / pair)), 0.0)
+
+
+def _corners(low: FloatArray, high: FloatArray) -> FloatArray:
+    """The corners (8, 3) of a box between two of them (3,)."""
+    corners: FloatArray = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1)
+    return corners.reshape(-1, 3)
 
 
 def _chequerboard() -> NDArray[np.uint8]:

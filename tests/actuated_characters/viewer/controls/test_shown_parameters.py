@@ -2,14 +2,20 @@
 
 import pytest
 
+from actuated_characters.scenes.scene import load_scene, scene_names
 from actuated_characters.viewer.controls.shown_parameters import (
     CONTROLLER,
     SIMULATOR,
+    TO_TRY,
+    ShownParameter,
+    check_controls,
+    parse_slider,
     shown_parameters,
 )
 from controller_node.parameters import PARAMETERS as CONTROLLERS
 from controller_node.parameters import character_parameters
 from msgs_config.character.loading import load_character
+from msgs_config.errors import ConfigurationError
 from sim_node.parameters import PARAMETERS as SIMULATORS
 
 
@@ -49,3 +55,56 @@ def test_a_character_without_clips_has_no_menu_of_them() -> None:
 
     assert "clip" not in names
     assert "gravity" in names
+
+
+def test_a_scene_has_its_own_controls_first_and_none_twice() -> None:
+    texts = ("controller_node.gain_scale.p 0 9 0.5 kp", "controller_node.law", "sim_node.gravity")
+    folders = shown_parameters(load_character("lift"), texts)
+
+    assert next(iter(folders)) == TO_TRY
+    assert [each.name for each in folders[TO_TRY]] == ["gain_scale.p", "law", "gravity"]
+    names = [each.name for folder in folders.values() for each in folder]
+    assert len(names) == len(set(names))
+
+
+def test_a_slider_is_read_from_its_text() -> None:
+    slider = parse_slider("sim_node.wrench_duration 0.1 2 0.1 Pushes (s)")
+
+    expected = ShownParameter(
+        "wrench_duration", "Pushes (s)", range=(0.1, 2.0, 0.1), nodes=(SIMULATOR,)
+    )
+    assert slider == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "controller_node.law 0 1",
+        "viewer.fps 0 9 1 fps",
+        "controller_node.gain_scale.p 3 1 0.1 kp",
+        "controller_node.gain_scale.p 0 1 nan kp",
+        "",
+    ],
+)
+def test_a_control_that_is_none_is_refused_in_a_line(text: str) -> None:
+    with pytest.raises(ConfigurationError, match="write it as"):
+        check_controls([text])
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_the_controls_and_curves_of_a_scene_are_ones_of_its_nodes(name: str) -> None:
+    scene = load_scene(name)
+    of_characters = {str(each["character"]) for each in list(scene.nodes.values())[1:]}
+    for character in map(load_character, of_characters):
+        known = {
+            CONTROLLER: {each.name for each in [*CONTROLLERS, *character_parameters(character)]},
+            SIMULATOR: {each.name for each in SIMULATORS},
+        }
+        texts = scene.viewer.get("controls", [])
+        assert isinstance(texts, list)
+        own = shown_parameters(character, texts).get(TO_TRY, ())
+        assert len(own) == len(texts)
+        assert all(each.name in known[node] for each in own for node in each.nodes)
+        curves = scene.viewer.get("curves", [])
+        assert isinstance(curves, list)
+        assert set(curves) <= set(character.layout.dof_names)

@@ -5,7 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuated_characters.viewer.controls.touch import LIMIT, Drag, aim_throw, spring_force
+from actuated_characters.viewer.controls.touch import (
+    LIMIT,
+    POURED,
+    Drag,
+    aim_throw,
+    pour_balls,
+    spring_force,
+)
 from msgs_config.errors import CommandError
 
 GRAVITY = 9.81
@@ -16,6 +23,19 @@ def test_a_spring_pulls_towards_the_pointer_with_its_stiffness() -> None:
     force = spring_force(400.0, np.array((1.0, 0.0, 0.5)), np.array((1.0, 0.25, 0.5)))
 
     assert force.tolist() == [0.0, 100.0, 0.0]
+
+
+def test_balls_that_are_poured_are_above_the_root_and_do_not_touch() -> None:
+    root = np.array((3.0, -2.0, 0.9))
+
+    throws = pour_balls(root, 2.0)
+    centres = np.array([throw.position for throw in throws])
+    apart = np.linalg.norm(centres[:, np.newaxis] - centres, axis=2)[np.triu_indices(POURED, 1)]
+
+    assert len(throws) == POURED
+    assert apart.min() > 2.0 * throws[0].radius
+    assert centres[:, 2].min() > root[2] + 1.0
+    assert centres[:, :2].mean(axis=0) == pytest.approx(root[:2])
 
 
 def test_a_spring_never_pulls_harder_than_the_limit() -> None:
