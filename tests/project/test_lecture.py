@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from actuated_characters.scenes.slides import lecture_slides
 from lecture.framework.catalogue import NAMES
 
 PROJECT = Path(__file__).parents[2]
@@ -28,3 +29,14 @@ def test_every_file_that_it_names_exists() -> None:
 
     assert len(files) > 5
     assert [file for file in files if not (PROJECT / file).is_file()] == []
+
+
+def test_its_table_of_slides_is_that_of_the_command() -> None:
+    rows = [
+        f"| {each.numbers} | {each.content} | "
+        + (", ".join(f"`{command}`" for command in each.commands) or each.why)
+        + " |"
+        for each in lecture_slides()
+    ]
+
+    assert "\n".join(rows) in TEXT, "docs/lecture.md needs these rows:\n" + "\n".join(rows)
