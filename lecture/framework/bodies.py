@@ -63,8 +63,22 @@ def write_hinged_boxes(runner: StudyRunner, name: str, parent: Box, child: Box) 
 
     Returns the character's path.
     """
-    joint = f"""  <joint name="{HINGE}" type="continuous">
-    <parent link="{parent.name}"/><child link="{child.name}"/><axis xyz="0 1 0"/>
+    return _write_pair(runner, name, parent, child, 'type="continuous"', '<axis xyz="0 1 0"/>')
+
+
+def write_jointed_boxes(runner: StudyRunner, name: str, parent: Box, child: Box) -> str:
+    """Write two boxes that float, joined by a ball joint at the origins of both.
+
+    Returns the character's path.
+    """
+    return _write_pair(runner, name, parent, child, 'type="spherical"', "")
+
+
+def _write_pair(
+    runner: StudyRunner, name: str, parent: Box, child: Box, kind: str, axis: str
+) -> str:
+    joint = f"""  <joint name="{HINGE}" {kind}>
+    <parent link="{parent.name}"/><child link="{child.name}"/>{axis}
   </joint>
 """
     return _write(runner, name, parent.link() + child.link() + joint)

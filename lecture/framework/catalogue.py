@@ -8,6 +8,7 @@ if TYPE_CHECKING:  # it takes a second to import
 
 NAMES = (
     "rigid_body",
+    "constraints",
     "joint_torque",
     "equation",
     "lift",

@@ -89,6 +89,11 @@ def move(
     return RigidBodyMotion(centre, turn, velocity, spin)
 
 
+def order_of(steps: FloatArray, errors: Sequence[float]) -> float:
+    """The order of errors (k,) at steps (k,): the slope of their logarithms."""
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
 def _rate(body: RigidBody, loads: Sequence[Load], state: FloatArray) -> FloatArray:
     """The rate (13,) of centre, quaternion, velocity and angular velocity: `dq/dt = q w / 2`."""
     turn, velocity, spin = state[3:7], state[7:10], state[10:13]
