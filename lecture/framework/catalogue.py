@@ -8,6 +8,7 @@ if TYPE_CHECKING:  # it takes a second to import
 
 NAMES = (
     "rigid_body",
+    "integrators",
     "constraints",
     "joint_torque",
     "equation",
