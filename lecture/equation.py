@@ -1,6 +1,5 @@
-"""The equation of motion tick by tick, with and without contacts; and where a tick's time goes."""
+"""The equation of motion tick by tick, with and without contacts."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -9,13 +8,9 @@ import numpy as np
 from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.equation_of_motion import EquationOfMotion
 from actuated_characters.render.plots import label
-from actuated_characters.runs.plan import make_plan
-from controller_node.parameters import make_controller
 from lecture.framework.result import Row, StudyResult
-from lecture.framework.study import WALK, RunResult, RunSpec, StudyRunner
+from lecture.framework.study import WALK, RunSpec, StudyRunner
 from msgs_config.arrays import FloatArray
-from sim_node.physics.simulation import Simulation
-from sim_node.simulation_factory import make_character_setup, make_simulation_settings
 
 TITLE = "what is left of M (v' - v) / h + C = f + J^T lambda, over its largest part"
 RUNS = 3
@@ -42,21 +37,18 @@ class Closure:
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
-    """Walk, stand and fall; put what went over the topics into the equation; time a walk."""
+    """Walk, stand and fall; put what went over the topics into the equation."""
     outcomes = {case.label: runner.run(case) for case in _CASES}
     closures = {name: close(outcome.recording) for name, outcome in outcomes.items()}
-    times, walk = _time_parts(outcomes["walk"]), closures["walk"]
+    walk = closures["walk"]
     result.rows += [_row(name, closure) for name, closure in closures.items()]
-    _draw(result, closures, times)
+    _draw(result, closures)
     curves = {"relative_residual": walk.relative, "without_contacts": walk.without_contacts}
     result.add_curves("equation_walk", {"time_s": walk.times, **curves})
-    physics, control, rest = times.values()
-    result.remarks += [
+    result.remarks.append(
         "all forces are on the topics, and the equation closes to rounding; the efforts of "
-        "joint limits are on none, and are left out on those joints' own entries",
-        f"of a tick's {physics + control + rest:.0f} us over topics physics takes {physics:.0f}, "
-        f"the control law {control:.0f}, topics and recorder {rest:.0f}",
-    ]
+        "joint limits are on none, and are left out on those joints' own entries"
+    )
 
 
 def _row(name: str, closure: Closure) -> Row:
@@ -86,31 +78,8 @@ def close(run: Recording) -> Closure:
     return Closure(run.times[:-1], np.array(relative), np.array(without), np.array(parts))
 
 
-def _time_parts(walk: RunResult) -> dict[str, float]:
-    """The parts of a tick's time, µs: two in one process, the rest of the run over topics."""
-    plan = make_plan("humanoid", 1.0, WALK, {}, {})
-    controller = make_controller(plan.character, plan.reference, plan.controller)
-    setup = make_character_setup(plan.character, plan.simulator)
-    physics, control = [], []
-    with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
-        (character,) = simulation.characters
-        episode_ns = character.state.stamp_ns
-        for _ in range(plan.ticks):
-            began = time.perf_counter()
-            effort, _ = controller.compute_effort(character.state, episode_ns)
-            answered = time.perf_counter()
-            simulation.step([np.where(character.commanded, effort, 0.0)])
-            control.append(answered - began)
-            physics.append(time.perf_counter() - answered)
-    seconds, ticks = walk.summary["wall_time_s"], walk.summary["ticks"]
-    assert isinstance(seconds, float) and isinstance(ticks, int)
-    parts = [1e6 * float(np.median(each)) for each in (physics, control)]
-    names = ("physics", "control law", "topics, processes, recorder")
-    return dict(zip(names, (*parts, 1e6 * seconds / ticks - sum(parts)), strict=True))
-
-
-def _draw(result: StudyResult, closures: Mapping[str, Closure], times: Mapping[str, float]) -> None:
-    residuals, norms, bars = result.add_panels(result.name, 3, 1, (10.0, 9.0))
+def _draw(result: StudyResult, closures: Mapping[str, Closure]) -> None:
+    residuals, norms = result.add_panels(result.name, 2, 1, (10.0, 6.0))
     for name, closure in closures.items():
         relative = np.maximum(closure.relative, _SMALLEST_DRAWN)
         without = np.maximum(closure.without_contacts, _SMALLEST_DRAWN)
@@ -125,9 +94,3 @@ def _draw(result: StudyResult, closures: Mapping[str, Closure], times: Mapping[s
     for column, name in enumerate(_PARTS):
         norms.semilogy(walk.times, walk.parts[:, column], linewidth=0.8, label=name)
     label(norms, "time (s)", "norm (N, N m)", "the equation's parts, walk", legend="upper right")
-    start = 0.0
-    for name, width in times.items():
-        bars.barh(0.0, width, left=start, label=f"{name}: {width:.0f} µs")
-        start += width
-    bars.set_yticks([])
-    label(bars, "time (µs)", "", "where a tick's time goes, walk", legend="upper right")

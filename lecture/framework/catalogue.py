@@ -12,6 +12,7 @@ NAMES = (
     "constraints",
     "joint_torque",
     "equation",
+    "tick",
     "lift",
     "gains",
     "feedforward",
