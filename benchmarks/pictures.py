@@ -1,7 +1,7 @@
-"""Pictures of planned motion, the reference an outline: `python -m benchmarks.pictures`.
+"""Pictures that no study makes, the reference an outline: `python -m benchmarks.pictures`.
 
-Those of docs/planning.md, all clips at some of their moments and two moving pictures, and the
-README's. It takes a quarter of an hour; `--only hero.webp` makes one of them.
+Those of docs/planning.md, all clips at some of their moments and two moving pictures, the README's
+and the moving one of docs/lecture.md. It takes a quarter of an hour; `--only hero.webp` makes one.
 """
 
 import argparse
@@ -22,13 +22,16 @@ from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import parse_push
+from lecture.framework.runner import Runner
+from lecture.gains import FACTORS
+from lecture.gains.step import film, run_steps
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import available_clips, read_clip
 
 MOMENTS = 8
 TILE, FRAME, WIDE = (150, 170), (400, 260), (640, 360)  # pixels
 FRAMES_A_SECOND = 20
-CLIPS = "planned_clips.webp"
+CLIPS, GAINS = "planned_clips.webp", "gains_step.webp"
 SIDEWAYS, FORWARDS = "root:0,300,0@1.5", "root:240,0,0@5.5"  # N, for 0.2 s
 Motion = tuple[str, float, tuple[str, ...]]
 MOVING: dict[str, tuple[tuple[int, int], list[Motion]]] = {
@@ -43,7 +46,7 @@ def main() -> int:
     """Simulate, draw and write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("docs/pictures"), help="(%(default)s)")
-    parser.add_argument("--only", choices=(CLIPS, *MOVING), help="the picture to make (all)")
+    parser.add_argument("--only", choices=(CLIPS, GAINS, *MOVING), help="the picture to make (all)")
     options = parser.parse_args()
     console = Console()
     if options.only in (None, CLIPS):
@@ -59,7 +62,17 @@ def main() -> int:
         size, runs = MOVING[name]
         pictures = [each for run in runs for each in draw_movie(simulate(*run), size)]
         write(pictures, options.folder / name)
+    if options.only in (None, GAINS):
+        write(film_gains(), options.folder / GAINS)
     return 0
+
+
+def film_gains() -> list[Picture]:
+    """A leg and both arms, lifted at once by the six pairs of gains of the study `gains`."""
+    with TemporaryDirectory() as folder:
+        runner = Runner(Path(folder), keep_runs=False, report=lambda label, share: None)
+        runs = run_steps(runner, list(dict.fromkeys(FACTORS.values())))
+        return film(FACTORS, runs, FRAMES_A_SECOND)
 
 
 def simulate(clip: str, duration: float, texts: tuple[str, ...] = ()) -> Recording:

@@ -30,13 +30,13 @@ from msgs_config.whole_files import write_whole
 from sim_node.physics.settings import WorldSettings
 
 LONGEST_ARROW = 0.4  # share of the extent of the characters
+GAP = 3  # pixels between pictures
 
 _MIN_EDGE, _MAX_EDGE = 16, 4096  # pixels along an edge of a picture
 _MOST_PIXELS = 2**26  # pixels of a whole strip
 _TILE_HEIGHT = 400  # pixels, by default
 _MIN_ASPECT, _MAX_ASPECT = 0.5, 1.6  # width over height, by default
 _COLUMNS = 8  # most columns, by default
-_GAP = 3  # pixels between pictures
 _WHITE = 255
 
 Progress = Callable[[int], None]
@@ -217,10 +217,10 @@ def side_by_side(tiles: Sequence[Picture], columns: int) -> Picture:
     height, width, _ = tiles[0].shape
     columns = min(columns, len(tiles))
     rows = -(-len(tiles) // columns)
-    shape = (rows * (height + _GAP) - _GAP, columns * (width + _GAP) - _GAP, 3)
+    shape = (rows * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3)
     whole = np.full(shape, _WHITE, dtype=np.uint8)
     for number, tile in enumerate(tiles):
         row, column = divmod(number, columns)
-        top, left = row * (height + _GAP), column * (width + _GAP)
+        top, left = row * (height + GAP), column * (width + GAP)
         whole[top : top + height, left : left + width] = tile
     return whole

@@ -20,6 +20,8 @@ from lecture.framework.tracking import (
     lag,
     overshoot,
 )
+from lecture.gains import step
+from lecture.theory import second_order
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from sim_node.physics.settings import WorldSettings
@@ -30,6 +32,7 @@ from tests.support.physics import LoneWorld, character
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 PERIOD = 1.0 / 240  # s
+LEGS = [name.replace(" ", "_") for name in gains.FACTORS]
 
 
 # The measures
@@ -208,6 +211,7 @@ def by_key(result: StudyResult, keys: int) -> Mapping[tuple[Any, ...], dict[str,
 def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gains, "_DURATION", 2.5)
     monkeypatch.setattr(gains, "_PICTURES", 1)
+    monkeypatch.setattr(step, "_POSES", (0.5,))
     runner = InProcessRunner(tmp_path)
 
     result = runner.study("gains")
@@ -232,7 +236,41 @@ def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert heavy[error] > following["normal stiffness"][error]
     assert heavy[late] > 60.0
     assert len(runner.cases) == gains.RUNS
-    assert set(result.figures) == {"gains", "gains_poses"}
+    assert set(result.figures) == {"gains", "gains_poses", "gains_step", "gains_step_poses"}
+    # at once: the softest sags, the least damped swings, the most damped creeps
+    curves = result.curves["gains_step"]
+    times, angle = curves["time_s"], {name: curves[f"{name}_rad"] for name in LEGS}
+    late = times > 2.5
+    assert angle["small_stiffness"][late].mean() < 0.8 * angle["normal_stiffness"][late].mean()
+    assert angle["small_damping"].max() > 1.35 * angle["small_damping"][late].mean()
+    assert angle["normal_damping"].max() < 1.1 * angle["normal_damping"][late].mean()
+    reached = {name: times[each > 0.5 * each[late].mean()][0] for name, each in angle.items()}
+    assert reached["large_stiffness"] < 0.5 * reached["normal_stiffness"]
+    assert reached["large_damping"] > 3.0 * reached["normal_damping"]
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.3, 1.0])
+def test_the_linear_response_of_one_mass_is_that_of_stable_pd(damping: float) -> None:
+    mass = character("lift")
+    ratio = second_order.stable_pd_damping_ratio(100.0, 20.0 * damping, 1.0, PERIOD)
+
+    path = step.linear_response(mass, np.ones(1), np.zeros(1), (1.0, damping), 700)[:, 0]
+
+    # the recurrence is of first order in h, so it is damped a little more than the equation
+    assert second_order.identify(path, PERIOD).damping_ratio == pytest.approx(ratio, rel=0.1)
+    beyond = second_order.measured_overshoot(path, 1.0)
+    assert beyond == pytest.approx(second_order.overshoot(ratio), abs=0.03)
+
+
+def test_a_step_overshoots_as_the_linear_whole_body_does(tmp_path: Path) -> None:
+    every = [(1.0, 1.0), (10.0, 1.0), (1.0, 0.1)]
+    runs = step.run_steps(InProcessRunner(tmp_path), every)
+
+    for factors, run in runs.items():
+        found = step.measure(run, factors)
+        expected = found.overshoot(found.theory)
+        assert found.overshoot(found.angle) == pytest.approx(expected, abs=0.05)
+        assert (expected > 0.4) == (factors == (1.0, 0.1))
 
 
 def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

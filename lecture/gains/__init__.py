@@ -1,4 +1,4 @@
-"""Small, normal and large stiffness and damping, with the reference's velocity and without."""
+"""Small, normal and large stiffness and damping: a walk, and a step of the pose."""
 
 from collections.abc import Mapping
 
@@ -15,17 +15,18 @@ from lecture.framework.tracking import (
     lag,
     overshoot,
 )
+from lecture.gains.step import Factors, describe, draw_steps, run_steps
 from msgs_config.arrays import FloatArray
 
-TITLE = "stiffness and damping x 0.1, 1, 10: the walk, with root assistance"
-RUNS = 10
+TITLE = "stiffness and damping x 0.1, 1, 10: the walk and a step, with root assistance"
+RUNS = 15
 
 _CHARACTER, _KNEE = "humanoid", "right_knee"
 _RATE, _DURATION = 240, 4.0  # Hz, s
 _MEASURED_SINCE = 0.5  # s; the time before is the start
 _LONGEST_LAG = 0.4  # s
 _SHOWN_SECONDS = 3.0  # s
-_FACTORS = {  # factors of stiffness and damping; the lecture's two rows of three pictures
+FACTORS: Mapping[str, Factors] = {
     "normal stiffness": (1.0, 1.0),
     "small stiffness": (0.1, 1.0),
     "large stiffness": (10.0, 1.0),
@@ -33,37 +34,42 @@ _FACTORS = {  # factors of stiffness and damping; the lecture's two rows of thre
     "small damping": (1.0, 0.1),
     "large damping": (1.0, 10.0),
 }
+"""Factors of stiffness and damping; the lecture's two rows of three pictures."""
+
 _VELOCITIES = {"clip": "with reference velocity", "zero": "without"}
 _PICTURES, _SIZE = 10, (180, 230)
 _PICTURED_SPAN = (1.27, 2.54)  # s, the second cycle
 
 
-_Runs = Mapping[tuple[tuple[float, float], str], RunResult]
+_Runs = Mapping[tuple[Factors, str], RunResult]
 
 
 def run(runner: StudyRunner, result: StudyResult) -> None:
-    """Walk by each pair of factors, with and without the reference's velocity.
+    """Walk by each pair of factors, with and without the reference's velocity; and lift a leg.
 
     With root assistance, so that what is seen is the joints' gains.
     """
     runs = {
         (factors, velocity): runner.run(_case(factors, velocity))
-        for factors in dict.fromkeys(_FACTORS.values())
+        for factors in dict.fromkeys(FACTORS.values())
         for velocity in _VELOCITIES
     }
+    steps = run_steps(runner, list(dict.fromkeys(FACTORS.values())))
     result.rows += [
         _row(name, velocity, runs[factors, velocity])
-        for name, factors in _FACTORS.items()
+        for name, factors in FACTORS.items()
         for velocity in _VELOCITIES
     ]
     _draw(result, runs)
     _draw_poses(result, runs)
+    draw_steps(result, FACTORS, steps)
     times, _, reference, _ = _knee(runs[(1.0, 1.0), "clip"].recording, (1.0, 1.0))
     curves = {"time_s": times, "reference_rad": reference}
     result.remarks += [
         "without the reference's velocity damping holds back: a slow motion lags by kd / kp; with "
         "it, it does not",
-        "small damping does not oscillate here, as stable PD adds a damping kp h",
+        "along the walk, which is slow, small damping does not oscillate; lifted at once a leg "
+        "overshoots, though stable PD adds a damping kp h: " + describe(steps, FACTORS),
     ]
     for ((p, d), velocity), outcome in runs.items():
         curves[f"p{p:g}_d{d:g}_{velocity}_rad"] = _knee(outcome.recording, (p, d))[1]
@@ -75,14 +81,14 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     result.add_curves("gains_knee", curves)
 
 
-def _case(factors: tuple[float, float], velocity: str) -> RunSpec:
+def _case(factors: Factors, velocity: str) -> RunSpec:
     p, d = factors
     controller = {"gain_scale.p": p, "gain_scale.d": d, "reference_velocity": velocity}
     label = f"p{p:g}_d{d:g}_{velocity}"
     return RunSpec(label, _CHARACTER, _DURATION, WALK, {"rate": _RATE}, controller)
 
 
-def _knee(run: Recording, factors: tuple[float, float]) -> FloatArray:
+def _knee(run: Recording, factors: Factors) -> FloatArray:
     """Times in s, the knee's angle, its reference, and that by theory, without inertia, in rad.
 
     Rows of an array (4, t).
@@ -102,7 +108,7 @@ def _knee(run: Recording, factors: tuple[float, float]) -> FloatArray:
 def _row(name: str, velocity: str, outcome: RunResult) -> Row:
     run, overshoots, late, expected = outcome.recording, None, None, None
     if not outcome.diverged:
-        knee = _knee(run, _FACTORS[name])
+        knee = _knee(run, FACTORS[name])
         _, angle, reference, theory = knee[:, knee[0] >= _MEASURED_SINCE]
         overshoots = overshoot(angle, reference)
         late, expected = (
@@ -123,7 +129,7 @@ def _row(name: str, velocity: str, outcome: RunResult) -> Row:
 def _draw(result: StudyResult, runs: _Runs) -> None:
     panels = result.add_panels(result.name, 2, 3, (13.0, 7.0), same_x=True)
     lags = zip(result.column("knee lag (ms)"), result.column("by theory (ms)"), strict=True)
-    for panel, (name, factors) in zip(panels, _FACTORS.items(), strict=True):
+    for panel, (name, factors) in zip(panels, FACTORS.items(), strict=True):
         texts = []
         for velocity, named in _VELOCITIES.items():
             outcome = runs[factors, velocity]
@@ -150,7 +156,7 @@ def _draw(result: StudyResult, runs: _Runs) -> None:
 def _draw_poses(result: StudyResult, runs: _Runs) -> None:
     """Poses of the second cycle, the reference as a ghost; its velocity followed."""
     pictures = {}
-    for name, factors in _FACTORS.items():
+    for name, factors in FACTORS.items():
         run = runs[factors, "clip"].recording
         end = float(run.times[-2])
         times = np.linspace(
