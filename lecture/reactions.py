@@ -1,12 +1,13 @@
 """A character that is hit by balls: how far it gives way, and how it comes back."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
-from actuated_characters.render.stills import strip
+from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.render.stills import pose_strip, strip
 from actuated_characters.report.charts import Marks
 from actuated_characters.report.events import Event, mode_events, throw_events
 from lecture.framework.result import Row, StudyResult
@@ -26,6 +27,8 @@ _RAGDOLL_HIT = 0.15  # s: later it is out of the ball's way
 _MOMENTUM_SPAN = 0.05  # s before and after the hit between which the ball's momentum is compared
 _AS_BEFORE = 1.1  # times the largest error without a hit
 _PEAK = 1.5  # s after the hit in which the root's largest displacement is looked for
+_TILE = (162, 270)  # pixels
+_CAPTURED = "the captured motion"
 _MODES = ("REACT", "BLEND", "LIMP")
 _POSES = {  # what is seen of each run, and when, s
     "ragdoll": (
@@ -78,16 +81,31 @@ def run(runner: StudyRunner, result: StudyResult) -> None:
     _draw(result, alone, hits, reactions)
     for name, recording in {**poses, "reactive": hits[20.0]}.items():
         title, times = _POSES[name]
+        pictures = {title: strip(recording, times)}
+        if name == "reactive":
+            pictures = _beside(alone, recording, title, times)
         result.add_pictures(
-            f"{result.name}_{name}",
-            {title: strip(recording, times)},
-            title_height=0.4,
-            title_place="center",
+            f"{result.name}_{name}", pictures, title_height=0.4, title_place="center"
         )
     result.remarks.append(
         "assistance: full while it follows a clip, at most 0.2 of the weight in REACT, "
         "none in LIMP; the ragdoll has none"
     )
+
+
+def _beside(
+    alone: Recording, hit: Recording, title: str, times: Sequence[float]
+) -> dict[str, Picture]:
+    """The captured motion and, below it at the same times, the reaction.
+
+    As Zordan et al. 2005, "Dynamic Response for Motion Capture Animation", show theirs.
+    """
+    rows = np.searchsorted(alone.times, times)
+    captions = [f"{time:.2f} s" for time in times]
+    captured = pose_strip(
+        alone.character, alone.reference_position[rows], captions, columns=len(rows), size=_TILE
+    )
+    return {_CAPTURED: captured, title: strip(hit, times, columns=len(rows), size=_TILE)}
 
 
 def _row(planned: float, reaction: HitEffects, run: Recording) -> Row:

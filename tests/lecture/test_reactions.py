@@ -49,6 +49,17 @@ def test_the_pictures_are_there(result: StudyResult) -> None:
     assert set(result.figures) == {"reactions", *(f"reactions_{kind}" for kind in kinds)}
 
 
+def test_the_captured_motion_is_above_its_reaction(result: StudyResult) -> None:
+    captured, reaction = result.figures["reactions_reactive"].axes
+
+    assert captured.get_title("center") == "the captured motion"
+    above, below = (np.asarray(axes.images[0].get_array()) for axes in (captured, reaction))
+    assert above.shape == below.shape
+    black = [(picture.max(axis=2) < 70).sum() for picture in (above, below)]
+    # both have the captions' letters; no captured motion has the ball
+    assert black[1] > 5 * black[0]
+
+
 def test_a_ball_that_hits_nothing_loses_no_momentum(runner: InProcessRunner) -> None:
     run = runner.run(RunSpec("past", "pendulum", 1.2)).recording
     throw = ProjectileThrow(3.0, 0.1, (0.0, 0.0, 9.0), (2.0, 0.0, 0.0))
