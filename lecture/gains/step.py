@@ -164,20 +164,38 @@ def draw_steps(
         curves |= {"time_s": step.times, f"{name.replace(' ', '_')}_rad": step.angle}
     panels[0].legend(loc="upper right", fontsize="small")
     result.add_curves("gains_step", curves)
-    times = np.array(_POSES)
-    pictures = {}
-    for name, factors in named.items():
-        run = runs[factors]
-        rows = np.searchsorted(run.times, np.minimum(times, run.times[-2]))
-        pictures[f"{name}; the target an outline"] = pose_strip(
-            run.character,
-            run.position[rows],
-            [f"{time:.2f} s" for time in times],
-            ghosts=run.reference_position[rows],
-            columns=len(rows),
-            size=_TILE,
-        )
-    result.add_pictures("gains_step_poses", pictures)
+    titles = [f"{name}; the target an outline" for name in named]
+    states = [(runs[factors], time) for factors in named.values() for time in _POSES]
+    captions = [f"{time:.2f} s" for _, time in states]
+    rows = _draw(states, captions, parts=len(named), columns=len(_POSES), size=_TILE)
+    result.add_pictures("gains_step_poses", dict(zip(titles, rows, strict=True)))
+
+
+def _draw(
+    states: Sequence[tuple[Recording, float]],
+    captions: Sequence[str],
+    *,
+    parts: int,
+    columns: int,
+    size: Size,
+) -> list[Picture]:
+    """Pictures of runs at times in s, in rows of so many columns, cut into equal parts.
+
+    They are drawn in one go, for that needs one skin, and has one scale.
+    """
+    rows = [
+        (run, int(np.searchsorted(run.times, min(time, run.times[-2])))) for run, time in states
+    ]
+    whole = pose_strip(
+        states[0][0].character,
+        np.array([run.position[row] for run, row in rows]),
+        captions,
+        ghosts=np.array([run.reference_position[row] for run, row in rows]),
+        columns=columns,
+        size=size,
+    )
+    tall = (len(whole) + GAP) // parts  # of a part, with what is below it
+    return [whole[number * tall : (number + 1) * tall - GAP] for number in range(parts)]
 
 
 def film(
@@ -197,20 +215,8 @@ def film(
         size: Width and height of each figure, pixels.
         columns: Figures in a row.
     """
-    shown = [runs[factors] for factors in named.values()]
-    first = shown[0]
-    times = np.arange(0.0, float(first.times[-2]), 1.0 / fps)
-    states = np.searchsorted(first.times, times)
-    positions, targets = (
-        np.stack([path[states] for path in paths], axis=1).reshape(-1, first.layout.size)
-        for paths in (
-            [run.position for run in shown],
-            [run.reference_position for run in shown],
-        )
-    )
+    end = min(float(run.times[-2]) for run in runs.values())
+    times = np.arange(0.0, end, 1.0 / fps).tolist()
+    states = [(runs[factors], time) for time in times for factors in named.values()]
     captions = [name for _ in times for name in named]
-    whole = pose_strip(
-        first.character, positions, captions, ghosts=targets, columns=columns, size=size
-    )
-    tall = (len(whole) + GAP) // len(times)  # of all figures at one time, with what is below them
-    return [whole[number * tall : (number + 1) * tall - GAP] for number in range(len(times))]
+    return _draw(states, captions, parts=len(times), columns=columns, size=size)
