@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.shape_meshes import surface_of
-from actuated_characters.render.engine.visual_shapes import drawn_shapes
 from character_motion.bvh.kinematics import continuous
 from character_motion.export.trajectories import (
     BallTrajectory,

@@ -6,8 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.camera_pose import Spheres
-from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
+from actuated_characters.render.engine.outlines import outline
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
@@ -39,7 +40,8 @@ class PosedCharacters:
         self._characters = characters
         self._models = [DynamicsModel(character) for character in characters]
         self._ends = np.cumsum([character.layout.size for character in characters])
-        self.shapes = [shapes for each in characters for shapes in drawn_shapes(each)]
+        self.shapes_of_characters = [drawn_shapes(each) for each in characters]
+        self.shapes = [shapes for each in self.shapes_of_characters for shapes in each]
         none = Spheres(np.empty((0, 3)), np.empty(0))
         self._around = [Spheres.joined([none, *map(outline, own)]) for own in self.shapes]
         # the spheres of all links in their frames: around the shapes, and the origins

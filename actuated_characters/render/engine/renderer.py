@@ -15,6 +15,7 @@ from actuated_characters.render.engine.compositor import Compositor, Picture
 from actuated_characters.render.engine.posed_characters import Frames, LinkForce, PosedCharacters
 from actuated_characters.render.engine.render_scene import RenderScene, Skinned
 from actuated_characters.render.engine.surfaces import HEAD_WIDTH
+from actuated_characters.render.skin.making import skin_of
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import PosedSkin
 from msgs_config.arrays import BoolArray, FloatArray
@@ -85,11 +86,23 @@ class Renderer:
         self._has_ground = ground and self.posed.stand_on_ground()
         self._has_terrain = terrain is not None
         self._skinned = skinned
-        skins = make_skins(characters) if skinned else []
+        skins = self._make_skins(characters) if skinned else []
         shapes = list(self.posed.shapes)
         for skin in skins:
             shapes[skin.links] = [() for _ in skin.colors]
         self._scene = RenderScene(shapes, terrain, skins)
+
+    def _make_skins(self, characters: Sequence[Character]) -> list[Skinned]:
+        """The skins of those characters that have one."""
+        skins, first = [], 0
+        for number, character in enumerate(characters):
+            links = slice(first, first + len(character.links))
+            first = links.stop
+            skin = skin_of(character, self.posed.shapes_of_characters[number])
+            if skin is not None:
+                colors = skin_colors(character, number)
+                skins.append(Skinned(PosedSkin(skin), colors, links))
+        return skins
 
     def picture(self, frame: FrameSpec, size: Size) -> Picture:
         """A picture (h, w, 3) of a width and a height in pixels."""
@@ -140,17 +153,3 @@ class Renderer:
 
 def _with_balls(bodies: Spheres, balls: FloatArray) -> Spheres:
     return Spheres.joined([bodies, Spheres(balls[:, :3], balls[:, 3])])
-
-
-def make_skins(characters: Sequence[Character]) -> list[Skinned]:
-    """The skins of those characters that have one; see `skin.making`."""
-    from actuated_characters.render.skin.making import has_skin, make_skin
-
-    skins, first = [], 0
-    for number, character in enumerate(characters):
-        links = slice(first, first + len(character.links))
-        first = links.stop
-        if has_skin(character):
-            colors = skin_colors(character, number)
-            skins.append(Skinned(PosedSkin(make_skin(character)), colors, links))
-    return skins

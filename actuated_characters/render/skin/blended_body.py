@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuated_characters.render.engine.visual_shapes import drawn_shapes
 from actuated_characters.render.skin import distances
 from actuated_characters.render.skin.cores import Core, core_of
 from actuated_characters.render.skin.distances import BodyParts
@@ -50,9 +49,8 @@ class BlendedBody:
         return (body.origins - reach).min(axis=0), (body.origins + reach).max(axis=0)
 
 
-def blend(character: Character) -> BlendedBody:
-    """The body of a character that has no meshes, in its `spread_pose`."""
-    shapes_of_links = drawn_shapes(character)
+def blend(character: Character, shapes_of_links: Sequence[Sequence[Shape]]) -> BlendedBody:
+    """The body of a character's links' shapes, none of them a mesh, in its `spread_pose`."""
     cores = [[core_of(shape) for shape in shapes] for shapes in shapes_of_links]
     model = DynamicsModel(character)
     spread = spread_pose(character, cores)

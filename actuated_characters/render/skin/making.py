@@ -1,33 +1,59 @@
 """Makes a character's skin: the surface of its blended body, bound to the links."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 import manifold3d
 import numpy as np
 
-from actuated_characters.render.engine.visual_shapes import drawn_shapes
 from actuated_characters.render.skin.blended_body import blend
 from actuated_characters.render.skin.fitting import fit, owners_of
 from actuated_characters.render.skin.skin import BONES, Skin
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.model import Character, ShapeType
+from msgs_config.character.model import Character, Link, Shape, ShapeType
 from msgs_config.geometry import fixed_order
 from msgs_config.geometry.surface import Surface
 
 MOST_TRIANGLES = 20_000
 
 _FINEST = 112.0  # edges of triangles along the diagonal of the body's box
+_MOST_KEPT = 16  # skins of so many models, some 2 MB each
 _COARSER = 1.15  # factor on the edges while there are too many triangles
 
 
-def has_skin(character: Character) -> bool:
-    """Whether a character has a skin: a floating base, and no meshes, which have a look already."""
-    shapes = [shape for own in drawn_shapes(character) for shape in own]
-    is_plain = all(shape.type is not ShapeType.MESH for shape in shapes)
-    return is_plain and character.layout.has_floating_base and len(character.links) > 1
+@dataclass(frozen=True)
+class _Model:
+    """What a skin depends on: characters that are equal in it have the same one."""
+
+    links: tuple[Link, ...]
+    shapes: tuple[tuple[Shape, ...], ...]  # of each link, as it is drawn
+    rest: tuple[float, ...]  # (n,), message form, but for the root's place
+    character: Character = field(compare=False)
 
 
-def make_skin(character: Character) -> Skin:
-    """The skin of a character of which no shape is a mesh."""
-    body = blend(character)
+def skin_of(character: Character, shapes: Sequence[tuple[Shape, ...]]) -> Skin | None:
+    """The skin of a character, one for all of the same model; not to be changed.
+
+    None where it has a fixed base, or a mesh, which has a look already.
+
+    Args:
+        character: Whose.
+        shapes: Of each link, as it is drawn (`drawn_shapes`).
+    """
+    is_plain = all(shape.type is not ShapeType.MESH for own in shapes for shape in own)
+    if not (is_plain and character.layout.has_floating_base and len(character.links) > 1):
+        return None
+    rest = list(character.rest_position)
+    del rest[character.layout.joints[0].entries]
+    return _make(_Model(character.links, tuple(shapes), tuple(rest), character))
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _make(model: _Model) -> Skin:
+    """Make it, which takes a second."""
+    character = model.character
+    body = blend(character, model.shapes)
     low, high = body.bounds()
     edge = float(fixed_order.norm(high - low)) / _FINEST
     while True:

@@ -23,11 +23,15 @@ _EFFORT, _EFFORT_OF_BODY = 0.01, 0.8
 def spread_pose(character: Character, cores: Sequence[Sequence[Core]]) -> FloatArray:
     """The position (n,), message form, at rest but for turns that part links from each other.
 
+    The floating base is at the origin and not turned, so that it is one pose wherever a character
+    stands.
+
     Args:
         character: Whose.
         cores: Of the shapes of each link, in its frame.
     """
     position = np.array(character.rest_position)
+    position[character.layout.joints[0].entries] = 0.0
     if sum(map(len, cores)) > _MOST_CORES:  # each with each other one would take minutes
         return position
     gaps = _Gaps(character, cores)

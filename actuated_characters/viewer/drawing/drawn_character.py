@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import viser
 
+from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.camera_pose import Spheres
+from actuated_characters.render.engine.outlines import outline
 from actuated_characters.render.engine.shape_meshes import surface_of
-from actuated_characters.render.engine.visual_shapes import drawn_shapes, outline
-from actuated_characters.render.skin.making import has_skin, make_skin
+from actuated_characters.render.skin.making import skin_of
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import Skin
 from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
@@ -88,8 +89,9 @@ class DrawnCharacter:
         self._skin: DrawnSkin | None = None
         self._shows_skin = False
         self._ghost_skin: GhostSkin | None = None
-        if has_skin(character):
-            self._add_skin(make_skin(character), skin_colors(character, number))
+        skin = skin_of(character, shapes)
+        if skin is not None:
+            self._add_skin(skin, skin_colors(character, number))
         else:
             for row, own in enumerate(shapes):
                 for k, shape in enumerate(own):

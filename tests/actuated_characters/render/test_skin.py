@@ -1,5 +1,6 @@
 """Skins: closed surfaces around a character's shapes that follow its links."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations, product
 
@@ -7,19 +8,19 @@ import numpy as np
 import pytest
 import trimesh
 
+from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
-from actuated_characters.render.engine.visual_shapes import drawn_shapes
 from actuated_characters.render.skin.blended_body import blend
 from actuated_characters.render.skin.cores import core_of
-from actuated_characters.render.skin.making import MOST_TRIANGLES, has_skin, make_skin
+from actuated_characters.render.skin.making import MOST_TRIANGLES, skin_of
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import PosedSkin, Skin
 from actuated_characters.render.skin.spread_pose import spread_pose
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.loading import load_character
-from msgs_config.character.model import Placement
+from msgs_config.character.model import Character, Placement, Shape, ShapeType
 from msgs_config.geometry import rotations
 from tests.support.physics import character
 
@@ -35,15 +36,21 @@ ixz="0" iyz="0"/></inertial><visual><origin xyz="0.3 0 0"/><geometry><box size="
 
 
 @cache
-def skin_of(name: str) -> Skin:
-    return make_skin(character(name))
+def skin_named(name: str) -> Skin:
+    return made(character(name))
+
+
+def made(whole: Character) -> Skin:
+    found = skin_of(whole, drawn_shapes(whole))
+    assert found is not None
+    return found
 
 
 @pytest.fixture(scope="module", params=["humanoid", "spider"])
 def skin(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Skin:
     """Of a humanoid, and of what a URDF makes of a cylinder and six boxes."""
     if request.param == "humanoid":
-        return skin_of("humanoid")
+        return skin_named("humanoid")
     path = tmp_path_factory.mktemp("spider") / "spider.urdf"
     yaws = np.arange(6) * np.pi / 3.0
     legs = [
@@ -51,7 +58,7 @@ def skin(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         for k, yaw in enumerate(yaws.tolist())
     ]
     path.write_text(SPIDER.format(legs="".join(legs)))
-    return make_skin(load_character(str(path)))
+    return made(load_character(str(path)))
 
 
 def mesh_of(skin: Skin) -> trimesh.Trimesh:
@@ -102,7 +109,7 @@ def test_its_normals_are_those_of_its_triangles(skin: Skin) -> None:
 
 def test_the_middle_of_each_shape_is_within_it() -> None:
     humanoid = character("humanoid")
-    skin = skin_of("humanoid")
+    skin = skin_named("humanoid")
     for row, shapes in enumerate(drawn_shapes(humanoid)):
         for shape in shapes:
             local = rotations.rotate(skin.turns_xyzw[row], core_of(shape).ends.mean(axis=0))
@@ -130,9 +137,9 @@ def test_what_no_joint_connects_is_apart_in_its_pose() -> None:
 
 
 def test_its_vertices_lie_on_the_body_that_it_is_of() -> None:
-    body = blend(character("humanoid"))
+    body = blend(character("humanoid"), drawn_shapes(character("humanoid")))
 
-    depths = [body.depth(*vertex) for vertex in skin_of("humanoid").surface.vertices.tolist()]
+    depths = [body.depth(*vertex) for vertex in skin_named("humanoid").surface.vertices.tolist()]
 
     assert np.abs(depths).max() < 5e-4  # m
 
@@ -174,7 +181,7 @@ def bent_knee(humanoid_skin: Skin, angle: float) -> tuple[FloatArray, int]:
 
 
 def test_a_joint_moves_what_is_near_or_beyond_it_alone() -> None:
-    whole = skin_of("humanoid")
+    whole = skin_named("humanoid")
 
     vertices, knee = bent_knee(whole, 1.0)
 
@@ -187,7 +194,7 @@ def test_a_joint_moves_what_is_near_or_beyond_it_alone() -> None:
 
 
 def test_its_parts_are_the_whole_each_triangle_once() -> None:
-    whole, humanoid = skin_of("humanoid"), character("humanoid")
+    whole, humanoid = skin_named("humanoid"), character("humanoid")
 
     parts = list(PosedSkin(whole).parts(whole.origins, whole.turns_xyzw, skin_colors(humanoid)))
 
@@ -202,9 +209,18 @@ def test_its_parts_are_the_whole_each_triangle_once() -> None:
 
 
 def test_a_robot_of_meshes_or_on_a_stand_has_none() -> None:
-    assert has_skin(character("humanoid"))
     for name in ("laikago", "kuka", "lift", "pendulum"):
-        assert not has_skin(character(name)), name
+        assert skin_of(character(name), drawn_shapes(character(name))) is None, name
+
+
+def test_characters_of_one_model_share_a_skin_wherever_they_stand() -> None:
+    humanoid = character("humanoid")
+    elsewhere = load_character("humanoid").placed(Placement(1.0, 2.0, 0.0, 2.5))
+    longer = replace(humanoid.links[3], shapes=(Shape(ShapeType.SPHERE, (0.2,)),))
+    other = replace(humanoid, links=(*humanoid.links[:3], longer, *humanoid.links[4:]))
+
+    assert made(elsewhere) is made(humanoid)
+    assert made(other) is not made(humanoid)
 
 
 def test_right_limbs_have_another_colour_wherever_the_character_stands() -> None:

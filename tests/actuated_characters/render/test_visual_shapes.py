@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuated_characters.render.drawn_shapes import branch_colors, drawn_shapes
+from actuated_characters.render.engine.outlines import outline
 from actuated_characters.render.engine.surfaces import round_surface
-from actuated_characters.render.engine.visual_shapes import branch_colors, drawn_shapes, outline
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character, Pose, Shape, ShapeType
 from tests.support.physics import character

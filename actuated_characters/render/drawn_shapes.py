@@ -1,22 +1,16 @@
-"""How a character looks: the shapes that the renderer can draw, their extents and colours.
+"""How a character looks: the shapes of its links that are drawn, and their colours.
 
 What is seen of a link may be a mesh in a format that is not read here; then the shapes that it
 collides with are drawn in its place.
 """
 
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
-import numpy as np
-
-from actuated_characters.render.engine.camera_pose import Spheres
-from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
-from msgs_config.character.meshes.triangles import check_readable, read_vertices
+from msgs_config.character.meshes.triangles import check_readable
 from msgs_config.character.model import Character, Quadruple, Shape, ShapeType
 from msgs_config.errors import CharacterError
-from msgs_config.geometry import rotations
 
 _SHADE = 0.86  # brightness of every second link along a branch
 _BRANCH_COLORS = (
@@ -78,28 +72,6 @@ def branch_colors(character: Character) -> list[Quadruple]:
 def _shaded(color: tuple[float, float, float], depth: int) -> Quadruple:
     red, green, blue = (part * (_SHADE if depth % 2 else 1.0) for part in color)
     return (red, green, blue, 1.0)
-
-
-def outline(shape: Shape) -> Spheres:
-    """Spheres whose hull holds a shape, in the link frame."""
-    points, radius = _own_outline(shape)
-    turned = rotations.rotate(np.array(shape.pose.orientation_xyzw), points)
-    return Spheres(turned + np.array(shape.pose.position), np.full(len(points), radius))
-
-
-def _own_outline(shape: Shape) -> tuple[FloatArray, float]:
-    """Centres (m, 3) in the shape's own frame, and their radius."""
-    if shape.type is ShapeType.SPHERE:
-        return np.zeros((1, 3)), shape.size[0]
-    if shape.type in (ShapeType.CYLINDER, ShapeType.CAPSULE):
-        radius, length = shape.size
-        return np.array([(0.0, 0.0, -0.5 * length), (0.0, 0.0, 0.5 * length)]), radius
-    if shape.type is ShapeType.BOX:
-        bounds = np.outer((-0.5, 0.5), shape.size)
-    else:
-        vertices = read_vertices(Path(shape.mesh)) * np.array(shape.size)
-        bounds = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    return np.array(list(product(*bounds.T))), 0.0
 
 
 def _solid(shapes: tuple[Shape, ...]) -> list[Shape]:
