@@ -31,7 +31,7 @@ _KNOWN_TO = {  # the formats of options that not every format has
     **dict.fromkeys(("topic", "base"), (_CSV, _BVH, _GLTF)),
     **dict.fromkeys(("from", "to", "fps"), (_BVH, _GLTF)),
     **dict.fromkeys(("units", "order"), (_BVH,)),
-    "ground": (_GLTF,),
+    **dict.fromkeys(("ground", "shapes"), (_GLTF,)),
 }
 _CENTIMETRES = 100.0  # in a metre
 _ORDERS = ("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX")
@@ -49,7 +49,7 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         "m), velocity.DOF (rad/s or m/s) and effort.DOF (N m or N, applied in the tick before the "
         "state; empty where there was none) of each degree of freedom, read back to the last bit; "
         "of a clip time_s and positions. .bvh is the skeleton of one character; .glb (binary) and "
-        ".gltf (text) are all characters with their shapes and colours, and thrown balls. Both "
+        ".gltf (text) are all characters as `render` draws them, and thrown balls. Both "
         "are y up, forward is z. .onnx is a trained policy for other runtimes, with joint names, "
         "gains and scales in its metadata (docs/policies.md).",
         [
@@ -97,6 +97,11 @@ def _add_options_of_formats(export: argparse.ArgumentParser) -> None:
     export.add_argument("--units", choices=("m", "cm"), help="BVH: unit of length (m)")
     export.add_argument("--order", choices=_ORDERS, help="BVH: order of rotation channels (ZXY)")
     export.add_argument("--ground", action="store_true", help="glTF: the plane z = 0, too")
+    export.add_argument(
+        "--shapes",
+        action="store_true",
+        help="glTF: the shapes themselves, not the skin around them",
+    )
 
 
 def _suffixes() -> str:
@@ -202,7 +207,13 @@ def _gltf(
 ) -> bytes:
     from actuated_characters.export.gltf_scene import make_document
 
-    document = make_document(motion, times, ground=options.ground, progress=progress)
+    document = make_document(
+        motion,
+        times,
+        ground=options.ground,
+        skinned=not options.shapes,
+        progress=progress,
+    )
     is_binary = options.output.suffix.lower() == _BINARY
     return document.to_glb() if is_binary else document.to_gltf()
 

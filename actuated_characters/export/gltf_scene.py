@@ -1,9 +1,13 @@
-"""A scene of characters and balls that move, as glTF: rigid links, each a node below its parent."""
+"""A scene of characters and balls that move, as glTF: each link is a node below its parent."""
 
 import numpy as np
 
+from actuated_characters.export.gltf_ground import add_ground
+from actuated_characters.export.gltf_skin import SkinnedMeshes
 from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.shape_meshes import surface_of
+from actuated_characters.render.skin.making import skin_of
+from actuated_characters.render.skin.palette import skin_colors
 from character_motion.bvh.kinematics import continuous
 from character_motion.export.trajectories import (
     BallTrajectory,
@@ -16,11 +20,10 @@ from character_motion.export.upright import UPRIGHT_XYZW
 from character_motion.gltf.document import GltfDocument
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Pose, Quadruple, Shape, ShapeType
+from msgs_config.character.model import Quadruple, Shape, ShapeType
 from msgs_config.geometry import rotations
 from msgs_config.geometry.surface import Surface
 
-_GROUND = Shape(ShapeType.BOX, (40.0, 40.0, 0.1), Pose((0.0, 0.0, -0.05)), (0.8, 0.82, 0.85, 1.0))
 _BALL_RGBA: Quadruple = (0.88, 0.37, 0.16, 1.0)
 _GENERATOR = "actuated_characters"
 _ROTATING_JOINTS = (JointType.REVOLUTE, JointType.SPHERICAL, JointType.FLOATING)
@@ -32,6 +35,7 @@ def make_document(
     times: FloatArray,
     *,
     ground: bool = False,
+    skinned: bool = True,
     progress: Progress | None = None,
 ) -> GltfDocument:
     """The scene at some times (f,) in s, of which the first one becomes 0.
@@ -40,12 +44,13 @@ def make_document(
         motion: What moves.
         times: In s, rising.
         ground: Whether the plane z = 0 is there, too.
+        skinned: Whether a character of plain shapes is seen as one smooth body, as in pictures.
         progress: Is told the frames so far, of each character one after the other.
 
     Raises:
         CharacterError: a mesh cannot be used; names its file.
     """
-    builder = _SceneBuilder(times)
+    builder = _SceneBuilder(times, skinned=skinned)
     if ground:
         builder.add_ground()
     for number, trajectory in enumerate(motion.characters):
@@ -61,36 +66,45 @@ def make_document(
 class _SceneBuilder:
     """Adds what is to be seen to a document, below one node that turns z up to y up."""
 
-    def __init__(self, times: FloatArray) -> None:
+    def __init__(self, times: FloatArray, *, skinned: bool) -> None:
         self.document = GltfDocument(_GENERATOR)
+        self._skins = SkinnedMeshes(self.document) if skinned else None
+        self._count = 0  # of characters so far
         self._seconds = times - times[0]
         self._times = self.document.add_times(self._seconds)
         self._world = self.document.add_node("world", rotation_xyzw=UPRIGHT_XYZW)
         self._meshes: dict[tuple[Shape, ...], int] = {}
 
     def add_ground(self) -> None:
-        self.document.add_node("ground", self._world, self._mesh("ground", (_GROUND,)))
+        """Add the plane z = 0."""
+        self.document.add_node("ground", self._world, add_ground(self.document, "ground"))
 
     def add_character(
         self, trajectory: CharacterTrajectory, poses: LinkPoses, *, several: bool
     ) -> None:
         """Add its links; those of several characters have the character's name before theirs."""
-        links = trajectory.character.links
+        character = trajectory.character
+        links, shapes_of_links = character.links, drawn_shapes(character)
+        skin = skin_of(character, shapes_of_links) if self._skins else None
         root, prefix = self._world, ""
         if several:
             root = self.document.add_node(trajectory.name, self._world)
             prefix = f"{trajectory.name}_"
         nodes = [root]
-        for row, shapes in enumerate(drawn_shapes(trajectory.character)):
+        for row, shapes in enumerate(shapes_of_links):
             link, name = links[row], prefix + links[row].name
             origins, turns = _in_parent(poses, row, link.parent)
-            mesh = self._mesh(name, shapes) if shapes else None
+            mesh = self._mesh(name, shapes) if shapes and skin is None else None
             node = self.document.add_node(name, nodes[link.parent + 1], mesh, origins[0], turns[0])
             nodes.append(node)
             if link.joint.type in _TRANSLATING_JOINTS:
                 self.document.animate(node, "translation", self._times, origins)
             if link.joint.type in _ROTATING_JOINTS:
                 self.document.animate(node, "rotation", self._times, turns)
+        if self._skins and skin is not None:
+            colors = skin_colors(character, self._count)
+            self._skins.add(f"{prefix}skin", character, skin, colors, nodes[1:])
+        self._count += 1
 
     def add_ball(self, ball: BallTrajectory) -> None:
         """Add a ball, of no size while it is not there, which is how glTF hides a node."""

@@ -1,4 +1,4 @@
-"""An own reader of glTF 2.0: nodes, and where they are when its animation plays.
+"""An own reader of glTF 2.0: nodes, and where they and skins are when its animation plays.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
@@ -12,8 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
-TYPES: dict[int, type[np.number[Any]]] = {5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+TYPES: dict[int, type[np.number[Any]]] = {
+    5121: np.uint8,
+    5123: np.uint16,
+    5125: np.uint32,
+    5126: np.float32,
+}
 Matrix = NDArray[np.float64]
 
 
@@ -49,7 +54,7 @@ class Gltf:
         view, width = self.content["bufferViews"][entry["bufferView"]], WIDTHS[entry["type"]]
         kind, start = TYPES[entry["componentType"]], view["byteOffset"]
         flat = np.frombuffer(self.buffer, kind, entry["count"] * width, start)
-        assert flat.nbytes <= view["byteLength"] and start % flat.itemsize == 0
+        assert flat.nbytes <= view["byteLength"] and start % 4 == 0
         return flat.reshape(-1, width)
 
     def node(self, name: str) -> int:
@@ -71,6 +76,23 @@ class Gltf:
             poses[number] = above @ _matrix(local[number])
             stack += [(child, poses[number]) for child in local[number].get("children", [])]
         return [poses[number] for number in range(len(local))]
+
+    def skinned(self, node: int, time: float) -> list[Matrix]:
+        """Where the vertices (m, 3) of a skinned mesh are at a time, part by part: linear blend."""
+        content = self.content
+        skin, poses = content["skins"][content["nodes"][node]["skin"]], self.poses(time)
+        binds = self.numbers(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
+        moved = np.array([poses[joint] @ binds[k] for k, joint in enumerate(skin["joints"])])
+        parts = []
+        for primitive in content["meshes"][content["nodes"][node]["mesh"]]["primitives"]:
+            places, joints, shares = (
+                self.numbers(primitive["attributes"][key])
+                for key in ("POSITION", "JOINTS_0", "WEIGHTS_0")
+            )
+            whole = np.column_stack((places, np.ones(len(places))))
+            blended = np.einsum("mk,mkij,mj->mi", shares, moved[joints], whole)
+            parts.append(blended[:, :3])
+        return parts
 
     def _value(self, sampler: dict[str, Any], time: float) -> NDArray[Any]:
         times, values = self.numbers(sampler["input"])[:, 0], self.numbers(sampler["output"])
@@ -103,6 +125,11 @@ def assert_valid(gltf: Gltf) -> None:
     assert content["asset"]["version"] == "2.0"
     assert content["buffers"][0]["byteLength"] <= len(gltf.buffer) < 2**32
     used = {accessor for mesh in content.get("meshes", []) for accessor in _check_mesh(gltf, mesh)}
+    for skin in content.get("skins", []):
+        assert len(gltf.numbers(skin["inverseBindMatrices"])) == len(skin["joints"])
+        used.add(skin["inverseBindMatrices"])
+    for node in content["nodes"]:
+        _check_skin(gltf, node)
     for animation in content["animations"]:
         targets = [
             (each["target"]["node"], each["target"]["path"]) for each in animation["channels"]
@@ -135,5 +162,18 @@ def _check_mesh(gltf: Gltf, mesh: dict[str, Any]) -> set[int]:
         np.testing.assert_allclose(lengths, 1.0, atol=1e-6)
         corners = gltf.numbers(primitive["indices"])
         assert len(corners) % 3 == 0 and corners.max() < len(gltf.numbers(places)) == len(lengths)
-        used |= {places, normals, primitive["indices"]}
+        used |= {*primitive["attributes"].values(), primitive["indices"]}
     return used
+
+
+def _check_skin(gltf: Gltf, node: dict[str, Any]) -> None:
+    """A skinned mesh has joints of its skin alone, at most four a vertex, of shares of sum one."""
+    if "skin" not in node:
+        return
+    count = len(gltf.content["skins"][node["skin"]]["joints"])
+    for primitive in gltf.content["meshes"][node["mesh"]]["primitives"]:
+        joints = gltf.numbers(primitive["attributes"]["JOINTS_0"])
+        shares = gltf.numbers(primitive["attributes"]["WEIGHTS_0"])
+        assert joints.shape == shares.shape == (len(joints), 4)
+        assert joints.max() < count and (joints[shares == 0.0] == 0).all() and (shares >= 0).all()
+        np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=4e-7)

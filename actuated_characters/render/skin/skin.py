@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Quadruple
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.surface import Surface
@@ -24,6 +24,14 @@ class Skin:
     weights: FloatArray  # (m, 4), of sum one
     origins: FloatArray  # (l, 3): of the link frames, m, world
     turns_xyzw: FloatArray  # (l, 4)
+
+    def colored(self, colors: Sequence[Quadruple]) -> Iterator[tuple[BoolArray, Quadruple]]:
+        """Its colours rgba, where the links (l,) have these: which triangles (k,) have each."""
+        for color in dict.fromkeys(colors):
+            rows = [row for row, own in enumerate(colors) if own == color]
+            which = np.isin(self.owners, rows)
+            if which.any():
+                yield which, color
 
 
 class PosedSkin:
@@ -54,9 +62,5 @@ class PosedSkin:
     ) -> Iterator[tuple[Surface, Quadruple]]:
         """The same in parts that have a colour each, of the colours (l,) of the links."""
         whole = self.surface(origins, turns_xyzw)
-        owners = self.skin.owners
-        for color in dict.fromkeys(colors):
-            rows = [row for row, own in enumerate(colors) if own == color]
-            triangles = whole.triangles[np.isin(owners, rows)]
-            if len(triangles):
-                yield whole._replace(triangles=triangles), color
+        for which, color in self.skin.colored(colors):
+            yield whole._replace(triangles=whole.triangles[which]), color

@@ -15,7 +15,7 @@ from tests.support.ros import wait_until
 pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
 
 SOON = 60.0  # s: WebGL by a processor
-COLOURED = 60  # of 255: how much more a colour than grey
+COLOURED = 32  # of 255: how much more a colour than the grey of the ground
 LEAST_PIXELS = 500  # of a character
 BODY = (slice(150, None), slice(0, 420))  # of the page, beside notes and panel
 

@@ -8,7 +8,12 @@ import pytest
 import trimesh
 
 from actuated_characters.export.gltf_scene import make_document
+from actuated_characters.render.drawn_shapes import drawn_shapes
+from actuated_characters.render.engine.ground import COLORS
 from actuated_characters.render.engine.shape_meshes import surface_of
+from actuated_characters.render.skin.making import skin_of
+from actuated_characters.render.skin.palette import skin_colors
+from actuated_characters.render.skin.skin import PosedSkin
 from character_motion.export.trajectories import BallTrajectory, Trajectories
 from character_motion.gltf.document import GltfDocument
 from msgs_config.character.model import Shape, ShapeType
@@ -66,7 +71,7 @@ def test_trimesh_sees_the_humanoid_stand_on_the_ground_with_the_volume_of_its_sh
     trajectory = replace(motion.characters[0], configurations=whole.layout.configuration(rest))
     still = replace(motion, times=np.zeros(1), characters=(trajectory,))
 
-    raw = make_document(still, np.zeros(1)).to_glb()
+    raw = make_document(still, np.zeros(1), skinned=False).to_glb()
 
     scene = trimesh.load_scene(io.BytesIO(raw), file_type="glb")
     (left, bottom, back), (right, top, front) = scene.bounds
@@ -77,6 +82,91 @@ def test_trimesh_sees_the_humanoid_stand_on_the_ground_with_the_volume_of_its_sh
     sizes = [shape for link in whole.links for shape in link.shapes]
     expected = sum(abs(_volume(shape)) for shape in sizes)
     assert scene.to_mesh().volume == pytest.approx(expected, rel=0.03)
+
+
+def test_a_skin_follows_the_links_as_in_pictures() -> None:
+    whole = character("humanoid")
+    motion, expected = random_motion(whole)
+
+    gltf = written(motion)
+
+    assert_valid(gltf)
+    skin = skin_of(whole, drawn_shapes(whole))
+    assert skin is not None
+    posed, node = PosedSkin(skin), gltf.node("skin")
+    for frame, time in enumerate(motion.sample_times().tolist()):
+        surface = posed.surface(expected.origins[frame], expected.turns_xyzw[frame])
+        parts = gltf.skinned(node, time)
+        for part, (which, _) in zip(parts, skin.colored(skin_colors(whole)), strict=True):
+            used = np.unique(surface.triangles[which])
+            places = surface.vertices[used] @ AXES.T
+            np.testing.assert_allclose(part, places, atol=10 * SINGLE)
+
+
+def test_a_skin_has_the_colours_of_pictures_and_its_triangles_each_once() -> None:
+    whole = character("humanoid")
+    motion, _ = random_motion(whole)
+
+    gltf = written(motion)
+
+    skin = skin_of(whole, drawn_shapes(whole))
+    assert skin is not None
+    (mesh,) = gltf.content["meshes"]
+    expected = list(skin.colored(skin_colors(whole)))
+    assert len(expected) == 2
+    for primitive, (which, color) in zip(mesh["primitives"], expected, strict=True):
+        corners = gltf.numbers(primitive["indices"]).reshape(-1, 3)
+        triangles = skin.surface.triangles[which]
+        np.testing.assert_array_equal(np.unique(triangles)[corners], triangles)
+        surface = gltf.content["materials"][primitive["material"]]["pbrMetallicRoughness"]
+        red = ((color[0] + 0.055) / 1.055) ** 2.4  # without its gamma
+        assert surface["baseColorFactor"][0] == pytest.approx(red)
+
+
+def test_trimesh_sees_the_skin_closed_and_on_the_ground() -> None:
+    motion, _ = random_motion(character("humanoid"))
+
+    raw = make_document(motion, motion.sample_times()).to_glb()
+
+    scene = trimesh.load_scene(io.BytesIO(raw), file_type="glb")
+    whole = scene.to_mesh()
+    mesh = trimesh.Trimesh(whole.vertices, whole.faces)  # which merges those of two colours
+    assert mesh.is_watertight and mesh.volume > 0.03
+    (_, bottom, _), (_, top, _) = mesh.bounds
+    assert bottom == pytest.approx(0.0, abs=SINGLE) and 1.4 < top < 1.8
+
+
+def test_characters_of_one_model_share_the_vertices_of_their_skins() -> None:
+    motion, _ = random_motion(character("humanoid"))
+    each = motion.characters[0]
+    two = replace(motion, characters=(replace(each, name="left"), replace(each, name="right")))
+
+    gltf = written(two)
+
+    assert_valid(gltf)
+    left, right = (mesh["primitives"] for mesh in gltf.content["meshes"])
+    for one, other in zip(left, right, strict=True):
+        assert one["attributes"] == other["attributes"] and one["material"] != other["material"]
+    joints = [set(skin["joints"]) for skin in gltf.content["skins"]]
+    assert not joints[0] & joints[1]
+
+
+def test_the_ground_has_the_tiles_of_pictures() -> None:
+    motion, _ = random_motion(character("pendulum"))
+
+    raw = make_document(motion, motion.sample_times(), ground=True).to_glb()
+
+    assert_valid(Gltf.of_glb(raw))
+    scene = trimesh.load_scene(io.BytesIO(raw), file_type="glb")
+    plane = scene.geometry["ground"]
+    picture = np.asarray(plane.visual.material.baseColorTexture.convert("RGB"))
+    height, width = picture.shape[:2]
+    for x, y in ((0.2, 0.3), (0.7, 0.3), (-0.2, 0.3), (-0.7, -1.8), (0.2, 12.6)):
+        (row,) = np.flatnonzero((np.sign(plane.vertices[:, :2]) == np.sign((x, y))).all(axis=1))
+        u, v = plane.visual.uv[row] * (x, y) / plane.vertices[row, :2]  # as it is linear
+        color = picture[int(((1.0 - v) % 1.0) * height), int((u % 1.0) * width)]
+        is_dark = (np.floor(x / 0.5) + np.floor(y / 0.5)) % 2
+        np.testing.assert_allclose(color, COLORS[int(is_dark)], atol=0.5)
 
 
 def _volume(shape: Shape) -> float:
