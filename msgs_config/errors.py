@@ -17,6 +17,10 @@ class CharacterError(ActuatedCharactersError):
     """A character file, its URDF or a name in it cannot be used."""
 
 
+class SkinError(ActuatedCharactersError):
+    """A file of a character's skin cannot be used, or does not fit the character."""
+
+
 class ClipError(ActuatedCharactersError):
     """A motion clip is missing or malformed, or does not fit the character."""
 

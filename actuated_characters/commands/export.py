@@ -16,10 +16,12 @@ from actuated_characters.commands.common.settings import (
     print_remarks,
     robot_source,
 )
+from actuated_characters.commands.common.skin_options import add_skin, given_skin
 from msgs_config.errors import ConfigurationError, RecordingError
 from msgs_config.whole_files import write_whole
 
 if TYPE_CHECKING:  # it takes a while to import
+    from actuated_characters.render.skin.given import GivenSkin
     from character_motion.export.trajectories import Trajectories
     from msgs_config.arrays import FloatArray
 
@@ -31,7 +33,7 @@ _KNOWN_TO = {  # the formats of options that not every format has
     **dict.fromkeys(("topic", "base"), (_CSV, _BVH, _GLTF)),
     **dict.fromkeys(("from", "to", "fps"), (_BVH, _GLTF)),
     **dict.fromkeys(("units", "order"), (_BVH,)),
-    **dict.fromkeys(("ground", "shapes"), (_GLTF,)),
+    **dict.fromkeys(("ground", "shapes", "skin", "skin-map"), (_GLTF,)),
 }
 _CENTIMETRES = 100.0  # in a metre
 _ORDERS = ("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX")
@@ -57,6 +59,7 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
             "export runs/demo --output demo.glb",
             "export walk --output walk.bvh --units cm",
             "export walk --output walk.onnx",
+            "export walk --skin body.glb --output body_walk.glb",
             "export runs/demo --topic description_joint_states --output robot.glb",
         ],
     )
@@ -102,6 +105,7 @@ def _add_options_of_formats(export: argparse.ArgumentParser) -> None:
         action="store_true",
         help="glTF: the shapes themselves, not the skin around them",
     )
+    add_skin(export, "glTF: ")
 
 
 def _suffixes() -> str:
@@ -114,7 +118,7 @@ def _export(options: argparse.Namespace) -> None:
     if kind is None:
         raise ConfigurationError(f"--output {options.output}: it must be a {_suffixes()} file")
     for name, kinds in _KNOWN_TO.items():
-        value = getattr(options, name)
+        value = getattr(options, name.replace("-", "_"))
         if value is not None and value is not False and kind not in kinds:
             raise ConfigurationError(
                 f"--{name} is of {' and '.join(kinds)}; {options.output} is none"
@@ -177,6 +181,7 @@ def _write_policy(options: argparse.Namespace, kind: str) -> None:
 def _write_motion(options: argparse.Namespace, kind: str) -> None:
     from actuated_characters.export.sources import read_source
 
+    skin = given_skin(options)
     motion = read_source(options.source, robot_source(options), print_remarks)
     start = getattr(options, "from")
     times = motion.sample_times(0.0 if start is None else start, options.to, options.fps)
@@ -190,7 +195,7 @@ def _write_motion(options: argparse.Namespace, kind: str) -> None:
     total = len(times) * len(motion.characters)
     with progress_bar(options.output.name, total, "frames", transient=True) as bar:
         content = (_bvh if kind == _BVH else _gltf)(
-            options, motion, times, lambda done: bar.update(bar.task_ids[0], completed=done)
+            options, motion, times, lambda done: bar.update(bar.task_ids[0], completed=done), skin
         )
     write_whole(options.output, content)
     print(
@@ -204,6 +209,7 @@ def _gltf(
     motion: "Trajectories",
     times: "FloatArray",
     progress: Callable[[int], None],
+    skin: "GivenSkin | None",
 ) -> bytes:
     from actuated_characters.export.gltf_scene import make_document
 
@@ -212,6 +218,7 @@ def _gltf(
         times,
         ground=options.ground,
         skinned=not options.shapes,
+        skin=skin,
         progress=progress,
     )
     is_binary = options.output.suffix.lower() == _BINARY
@@ -223,7 +230,9 @@ def _bvh(
     motion: "Trajectories",
     times: "FloatArray",
     progress: Callable[[int], None],
+    skin: "GivenSkin | None",
 ) -> bytes:
+    del skin
     from character_motion.bvh.writing import bvh_text
     from character_motion.export.bvh_motion import to_bvh
 

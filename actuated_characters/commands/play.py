@@ -15,6 +15,7 @@ from actuated_characters.commands.common.settings import (
     add_repeated,
     node_settings,
 )
+from actuated_characters.commands.common.skin_options import given_skin
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
@@ -91,6 +92,7 @@ def _play(options: argparse.Namespace) -> None:
         return
     if not options.no_view:
         require_extra("view", "play (without --no-view)")
+    given_skin(options)  # its errors come before all the work
     _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
 
 

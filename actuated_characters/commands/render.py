@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.settings import add_robot, print_remarks, robot_source
+from actuated_characters.commands.common.skin_options import add_skin, given_skin
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # they take a second to import
@@ -32,6 +33,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "or an --output that ends in .mp4, as a movie. Arrows are pushes since the last picture.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
         "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3; "
+        "actuated_characters render runs/demo --skin body.glb; "
         "actuated_characters render runs/demo --topic description_joint_states",
     )
     render.set_defaults(command=_render)
@@ -50,6 +52,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     add("--reference", action="store_true", help="the same as --ghost over")
     add("--shapes", action="store_true", help="the shapes themselves, not the skin around them")
+    add_skin(render)
     add("--size", metavar="WxH", help="pixels of a picture (strip: as suits; movie: 960x540)")
     add = render.add_argument_group("strip").add_argument
     add("--times", metavar="S,S,...", help="when, in s since the run's first state")
@@ -104,6 +107,7 @@ def _render_strip(options: argparse.Namespace) -> None:
     from actuated_characters.recorder.run_directory import STRIP
     from actuated_characters.render.stills import save_png, strip
 
+    skin = given_skin(options)
     recordings = _read(options)
     output = _output(options, STRIP)
     count = times if isinstance(times, int) else len(times)
@@ -117,6 +121,7 @@ def _render_strip(options: argparse.Namespace) -> None:
             ghost=options.reference or options.ghost == "over",
             size=size,
             skinned=not options.shapes,
+            skin=skin,
             progress=lambda done: bar.update(bar.task_ids[0], completed=done),
         )
     save_png(picture, output)
@@ -139,6 +144,7 @@ def _render_movie(options: argparse.Namespace) -> None:
         ghost=None if ghost is None else GhostPlace(ghost),
         contacts=options.contacts,
         skinned=not options.shapes,
+        skin=given_skin(options),
         workers=options.workers,
     )
     check_video(settings.size, settings.fps)

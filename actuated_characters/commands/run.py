@@ -29,6 +29,7 @@ from actuated_characters.commands.common.settings import (
     add_repeated,
     node_settings,
 )
+from actuated_characters.commands.common.skin_options import given_skin
 from actuated_characters.commands.common.tables import make_table
 from actuated_characters.commands.view import server_parameters
 from msgs_config.errors import ConfigurationError, one_of
@@ -115,6 +116,9 @@ def _run(options: argparse.Namespace) -> None:
         return
     if options.view:
         require_extra("view", "--view")
+        given_skin(options)  # its errors come before all the work
+    elif options.skin or options.skin_map:
+        raise ConfigurationError("--skin and --skin-map are of --view")
     if not options.in_process:
         require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)

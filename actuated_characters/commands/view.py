@@ -13,6 +13,7 @@ from actuated_characters.commands.common.settings import (
     print_remarks,
     robot_source,
 )
+from actuated_characters.commands.common.skin_options import add_skin, given_skin, skin_parameters
 from actuated_characters.viewer.parameters import ViewerSettings
 from msgs_config.errors import ConfigurationError
 from msgs_config.runtime.extras import require_extra
@@ -35,6 +36,7 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
             "view",
             "view runs/demo",
             "view runs/demo runs/demo-fork",
+            "view runs/demo --skin body.glb",
             "view runs/demo --topic description_joint_states",
         ],
     )
@@ -52,7 +54,7 @@ def add_view(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 
 def add_server(command: argparse._ActionsContainer) -> None:
-    """Add the options that say where the viewer's page is."""
+    """Add the options that say where the viewer's page is, and how characters look on it."""
     command.add_argument(
         "--host",
         default=ViewerSettings.host,
@@ -73,11 +75,17 @@ def add_server(command: argparse._ActionsContainer) -> None:
         metavar="HZ",
         help="most pictures a second (%(default)g)",
     )
+    add_skin(command)
 
 
 def server_parameters(options: argparse.Namespace) -> dict[str, object]:
     """The viewer's parameters of those options."""
-    return {"host": options.host, "port": options.port, "fps": options.fps}
+    return {
+        "host": options.host,
+        "port": options.port,
+        "fps": options.fps,
+        **skin_parameters(options),
+    }
 
 
 def _view(options: argparse.Namespace) -> None:
@@ -107,6 +115,7 @@ def _view_recorded(options: argparse.Namespace) -> None:
     if options.namespace is not None:
         raise ConfigurationError("--namespace is of running simulators; a RUN has none")
     settings = ViewerSettings.given(server_parameters(options))
+    skin = given_skin(options)
     from actuated_characters.viewer.recorded.main import show_recorded
 
     show_recorded(
@@ -117,4 +126,5 @@ def _view_recorded(options: argparse.Namespace) -> None:
         host=settings.host,
         port=settings.port or None,
         fps=settings.fps,
+        skin=skin,
     )

@@ -6,8 +6,8 @@ from actuated_characters.export.gltf_ground import add_ground
 from actuated_characters.export.gltf_skin import SkinnedMeshes
 from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.shape_meshes import surface_of
-from actuated_characters.render.skin.making import skin_of
-from actuated_characters.render.skin.palette import skin_colors
+from actuated_characters.render.skin.choosing import colors_of, skin_of
+from actuated_characters.render.skin.given import GivenSkin
 from character_motion.bvh.kinematics import continuous
 from character_motion.export.trajectories import (
     BallTrajectory,
@@ -36,6 +36,7 @@ def make_document(
     *,
     ground: bool = False,
     skinned: bool = True,
+    skin: GivenSkin | None = None,
     progress: Progress | None = None,
 ) -> GltfDocument:
     """The scene at some times (f,) in s, of which the first one becomes 0.
@@ -45,12 +46,14 @@ def make_document(
         times: In s, rising.
         ground: Whether the plane z = 0 is there, too.
         skinned: Whether a character of plain shapes is seen as one smooth body, as in pictures.
+        skin: A mesh from a file as that body.
         progress: Is told the frames so far, of each character one after the other.
 
     Raises:
         CharacterError: a mesh cannot be used; names its file.
+        SkinError: `skin` does not fit a character.
     """
-    builder = _SceneBuilder(times, skinned=skinned)
+    builder = _SceneBuilder(times, skinned=skinned, skin=skin)
     if ground:
         builder.add_ground()
     for number, trajectory in enumerate(motion.characters):
@@ -66,9 +69,10 @@ def make_document(
 class _SceneBuilder:
     """Adds what is to be seen to a document, below one node that turns z up to y up."""
 
-    def __init__(self, times: FloatArray, *, skinned: bool) -> None:
+    def __init__(self, times: FloatArray, *, skinned: bool, skin: GivenSkin | None) -> None:
         self.document = GltfDocument(_GENERATOR)
         self._skins = SkinnedMeshes(self.document) if skinned else None
+        self._given = skin
         self._count = 0  # of characters so far
         self._seconds = times - times[0]
         self._times = self.document.add_times(self._seconds)
@@ -85,7 +89,7 @@ class _SceneBuilder:
         """Add its links; those of several characters have the character's name before theirs."""
         character = trajectory.character
         links, shapes_of_links = character.links, drawn_shapes(character)
-        skin = skin_of(character, shapes_of_links) if self._skins else None
+        skin = skin_of(character, shapes_of_links, self._given) if self._skins else None
         root, prefix = self._world, ""
         if several:
             root = self.document.add_node(trajectory.name, self._world)
@@ -102,7 +106,7 @@ class _SceneBuilder:
             if link.joint.type in _ROTATING_JOINTS:
                 self.document.animate(node, "rotation", self._times, turns)
         if self._skins and skin is not None:
-            colors = skin_colors(character, self._count)
+            colors = colors_of(skin, character, self._count)
             self._skins.add(f"{prefix}skin", character, skin, colors, nodes[1:])
         self._count += 1
 

@@ -13,6 +13,8 @@ from msgs_config.character.model import Character, Quadruple
 from msgs_config.geometry import fixed_order, rotations
 from msgs_config.geometry.surface import Surface
 
+_WHITE: Quadruple = (1.0, 1.0, 1.0, 1.0)
+
 
 class _Bound(NamedTuple):
     """A skin that is in the document, upright and on the ground, y up."""
@@ -35,7 +37,7 @@ class SkinnedMeshes:
         name: str,
         character: Character,
         skin: Skin,
-        colors: Sequence[Quadruple],
+        colors: Sequence[Quadruple | None],
         nodes: Sequence[int],
     ) -> None:
         """Add a mesh, and its node, which is one of the scene's, as skinned ones are to be.
@@ -44,7 +46,7 @@ class SkinnedMeshes:
             name: Of both.
             character: Whose skin it is.
             skin: Which.
-            colors: Of the links (l,), rgba.
+            colors: Of the links (l,), rgba; None are the skin's own.
             nodes: Of the links (l,).
         """
         document = self._document
@@ -52,25 +54,34 @@ class SkinnedMeshes:
             self._bound[id(skin)] = self._bind(skin, character.up_axis)
         bound = self._bound[id(skin)]
         parts = [
-            (*self._part(bound, which), document.material(color))
+            (*self._part(bound, which, color is None), document.material(color or _WHITE))
             for which, color in skin.colored(colors)
         ]
         mesh = document.add_mesh_of(name, parts)
         moved = document.add_skin(name, nodes, bound.inverse_binds)
         document.add_node(name, mesh=mesh, skin=moved)
 
-    def _part(self, bound: _Bound, which: BoolArray) -> tuple[Attributes, IntArray]:
-        """Vertices and triangles of some of a skin's triangles (k,).
+    def _part(
+        self, bound: _Bound, which: BoolArray, has_colors: bool
+    ) -> tuple[Attributes, IntArray]:
+        """Vertices and triangles of some of a skin's triangles (k,), with its own colours or none.
 
         Each part has vertices of its own, for there are viewers that make the normals of each anew.
         """
         key = which.tobytes()
         if key not in bound.parts:
             surface, skin, document = bound.surface, bound.skin, self._document
-            used, corners = np.unique(surface.triangles[which], return_inverse=True)
-            triangles = corners.reshape(-1, 3)
+            texels, colors = np.zeros((1, 3)), np.zeros(which.sum(), dtype=np.intp)
+            if has_colors and skin.colors is not None:
+                texels, rows = np.unique(skin.colors[which], axis=0, return_inverse=True)
+                colors = rows.ravel()
+            # A vertex is there once for each colour of the triangles around it.
+            numbers = surface.triangles[which] * len(texels) + colors[:, np.newaxis]
+            found, corners = np.unique(numbers, return_inverse=True)
+            used, triangles = found // len(texels), corners.reshape(-1, 3)
             own = Surface(surface.vertices[used], surface.normals[used], triangles)
-            attributes = document.add_vertices(own)
+            shown = texels[found % len(texels)] if has_colors else None
+            attributes = document.add_vertices(own, colors=shown)
             attributes |= document.bind(skin.bones[used], skin.weights[used])
             bound.parts[key] = attributes, triangles
         return bound.parts[key]

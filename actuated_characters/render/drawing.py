@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from actuated_characters.render.engine.camera_pose import Size
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
+from actuated_characters.render.skin.given import GivenSkin
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import RunError
 from msgs_config.runtime.worker_processes import WorkerProcesses
@@ -25,11 +26,16 @@ class SceneSettings:
     size: Size
     write: Callable[[Picture, str], Picture]  # adds a caption
     skinned: bool = True  # draw skins in place of the shapes that they are made from
+    skin: GivenSkin | None = None  # from a file, in place of those
 
     def renderer(self) -> Renderer:
         """Make what draws it."""
         return Renderer(
-            self.characters, ground=self.ground, terrain=self.terrain, skinned=self.skinned
+            self.characters,
+            ground=self.ground,
+            terrain=self.terrain,
+            skinned=self.skinned,
+            skin=self.skin,
         )
 
 

@@ -25,6 +25,7 @@ from actuated_characters.render.engine.camera_pose import (
 from actuated_characters.render.engine.posed_characters import PosedCharacters, root_path
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
 from actuated_characters.render.scene import RecordedScene, make_scene, part_of
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.stills import LONGEST_ARROW, Progress, check_size
 from actuated_characters.render.video import check_video, write_video
 from msgs_config.arrays import FloatArray, IntArray
@@ -65,6 +66,7 @@ class MovieSettings:
     ghost: GhostPlace | None = None  # None: beside if there is a reference
     contacts: bool = False  # mark the links that touch something
     skinned: bool = True  # draw a smooth skin in place of plain shapes
+    skin: GivenSkin | None = None  # a mesh from a file as that skin
     workers: int | None = None  # processes that draw; None: as many as there are cores
 
 
@@ -121,6 +123,7 @@ class Movie:
             self._settings.size,
             write_on,
             self._settings.skinned,
+            self._settings.skin,
         )
         return draw(stays, self._frames, most)
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.image import imsave
@@ -22,6 +23,7 @@ from actuated_characters.render.engine.camera_pose import (
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
 from actuated_characters.render.scene import RecordedScene, make_scene, part_of
+from actuated_characters.render.skin.given import GivenSkin
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Character
 from msgs_config.clips.nearest_rows import nearest_rows
@@ -39,6 +41,16 @@ _MIN_ASPECT, _MAX_ASPECT = 0.5, 1.6  # width over height, by default
 _COLUMNS = 8  # most columns, by default
 _WHITE = 255
 
+
+class _Look(NamedTuple):
+    """How characters are drawn: `skinned` and `skin` of `strip`."""
+
+    skinned: bool = True
+    skin: GivenSkin | None = None
+
+
+_SKINNED = _Look()
+
 Progress = Callable[[int], None]
 """Called with the number of pictures so far."""
 
@@ -54,6 +66,7 @@ def strip(
     labels: bool = True,
     size: Size | None = None,
     skinned: bool = True,
+    skin: GivenSkin | None = None,
     progress: Progress | None = None,
 ) -> Picture:
     """Pictures of a run side by side, all of one scale; each follows the root along the ground.
@@ -70,6 +83,7 @@ def strip(
         labels: Write the time above each picture.
         size: Width and height of each picture in pixels.
         skinned: Draw a smooth skin in place of plain shapes (`Renderer`).
+        skin: A mesh from a file as that skin.
         progress: Is called after each picture.
 
     Raises:
@@ -83,7 +97,8 @@ def strip(
     captions = [f"{time:.2f} s" if labels else "" for time in scene.times[rows]]
     frames = scene.frames(rows, captions, ghosts=ghost)
     world = WorldSettings(ground=scene.ground, terrain=scene.terrain)
-    return _draw_strip(scene.characters, world, frames, columns, size, skinned, progress)
+    look = _Look(skinned, skin)
+    return _draw_strip(scene.characters, world, frames, columns, size, look, progress)
 
 
 def pose_strip(
@@ -130,7 +145,7 @@ def _draw_strip(
     frames: Sequence[FrameSpec],
     columns: int | None,
     size: Size | None,
-    skinned: bool = True,
+    look: _Look = _SKINNED,
     progress: Progress | None = None,
 ) -> Picture:
     """The strip of some frames, which have no views yet."""
@@ -138,7 +153,7 @@ def _draw_strip(
     if not count or (columns is not None and columns < 1):
         raise ConfigurationError(f"{count} pictures in rows of {columns}; both must be 1 or more")
     size, frames = _with_views(characters, frames, size)
-    settings = SceneSettings(characters, world.ground, world.terrain, size, captioned, skinned)
+    settings = SceneSettings(characters, world.ground, world.terrain, size, captioned, *look)
     tiles: list[Picture] = []
     for picture in draw(settings, frames):
         tiles.append(picture)

@@ -2,10 +2,14 @@
 
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 
+from actuated_characters.render.drawn_shapes import drawn_shapes
+from actuated_characters.render.skin.choosing import skin_of
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.panel import ControlPanel, Subject
@@ -31,7 +35,8 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters
-from msgs_config.errors import ActuatedCharactersError, ConfigurationError, one_of
+from msgs_config.character.model import Character
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError, SkinError, one_of
 from msgs_config.messages import topics
 from msgs_config.parameters import resolve
 from msgs_config.runtime.process import StopSignal
@@ -61,6 +66,7 @@ class ViewerNode(Node):
         for name in settings.hidden:
             if name not in SHOWN:
                 raise ConfigurationError(one_of("'hidden'", name, list(SHOWN)))
+        self._skin = _read_skin(settings)
         self._once_logger = OnceLogger(self.get_logger())
         host = settings.host
         self._rejections = Rejections()
@@ -201,7 +207,10 @@ class ViewerNode(Node):
         try:
             with self._server.atomic():
                 number = self._numbers.setdefault(below, len(self._numbers))
-                self._drawn[below] = LiveCharacter(self._scene.api, name, rebuilt, bind, number)
+                skin = self._skin_of(rebuilt.character)
+                self._drawn[below] = LiveCharacter(
+                    self._scene.api, name, rebuilt, bind, number, skin
+                )
                 self._draw_terrain(watched)
         except ActuatedCharactersError as error:
             self._log(f"'{rebuilt.character.name}' cannot be drawn: {error}")
@@ -218,9 +227,27 @@ class ViewerNode(Node):
         if terrain is not None:
             self._terrains[name] = text, draw_terrain(self._scene.api, name, terrain)
 
+    def _skin_of(self, character: Character) -> GivenSkin | None:
+        """The skin that is given, if it fits a character, which has its own one else."""
+        if self._skin is not None:
+            try:
+                skin_of(character, drawn_shapes(character), self._skin)
+            except SkinError as error:
+                self._log(f"'{character.name}' has its own skin: {error}")
+                return None
+        return self._skin
+
     def _remove(self, below: str) -> None:
         if (drawn := self._drawn.pop(below, None)) is not None:
             drawn.remove()
 
     def _log(self, sentence: str) -> None:
         self._once_logger.log_once(sentence)
+
+
+def _read_skin(settings: ViewerSettings) -> GivenSkin | None:
+    if not settings.skin:
+        return None
+    return GivenSkin.read(
+        Path(settings.skin), Path(settings.skin_map) if settings.skin_map else None
+    )

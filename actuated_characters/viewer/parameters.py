@@ -26,6 +26,8 @@ class ViewerSettings(Settings):
     )
     curves: tuple[str, ...] = parameter((), "degrees of freedom that are drawn over time")
     hidden: tuple[str, ...] = parameter((), f"what is not shown at first, of: {', '.join(SHOWN)}")
+    skin: str = parameter("", "file of a skinned mesh (.glb) as the body of every character")
+    skin_map: str = parameter("", "YAML file of that mesh's joints by links")
     fps: float = parameter(30.0, "most pictures a second", unit="Hz", minimum=1.0, maximum=120.0)
 
 

@@ -94,12 +94,19 @@ class GltfDocument:
             primitives.append({"attributes": attributes, "indices": corners, "material": material})
         return self._add("meshes", {"name": name, "primitives": primitives})
 
-    def add_vertices(self, surface: Surface, uvs: FloatArray | None = None) -> Attributes:
+    def add_vertices(
+        self,
+        surface: Surface,
+        uvs: FloatArray | None = None,
+        colors: FloatArray | None = None,
+    ) -> Attributes:
         """Add the vertices (m) of a surface, in m, with their normals.
 
         Args:
             surface: Which.
             uvs: Where they are in a texture (m, 2), right and down, 1 at its edges.
+            colors: Red, green and blue (m, 3), 0 to 1, with sRGB's gamma; the material's is
+                multiplied by them.
         """
         add = self._buffer.add_rows
         attributes = {
@@ -108,6 +115,8 @@ class GltfDocument:
         }
         if uvs is not None:
             attributes["TEXCOORD_0"] = add(uvs, VERTICES)
+        if colors is not None:
+            attributes["COLOR_0"] = add(_without_gamma(colors), VERTICES)
         return attributes
 
     def bind(self, joints: IntArray, weights: FloatArray) -> Attributes:
@@ -166,7 +175,7 @@ class GltfDocument:
     def material(self, color_rgba: Quadruple) -> int:
         """The number of the material of a colour, 0 to 1, with the gamma of sRGB."""
         if color_rgba not in self._materials:
-            factor = [*map(_linear, color_rgba[:3]), color_rgba[3]]
+            factor = [*_without_gamma(np.array(color_rgba[:3])).tolist(), color_rgba[3]]
             material = _surface({"baseColorFactor": factor})
             if color_rgba[3] < 1.0:
                 material["alphaMode"] = "BLEND"
@@ -228,7 +237,7 @@ def _surface(color: dict[str, Any]) -> dict[str, Any]:
     return {"pbrMetallicRoughness": {**color, "metallicFactor": 0.0, "roughnessFactor": _ROUGHNESS}}
 
 
-def _linear(level: float) -> float:
-    """A part of a colour, 0 to 1, without the gamma of sRGB (IEC 61966-2-1): as glTF has it."""
-    level = min(max(level, 0.0), 1.0)
-    return level / 12.92 if level <= 0.04045 else float(((level + 0.055) / 1.055) ** 2.4)
+def _without_gamma(levels: FloatArray) -> FloatArray:
+    """Parts of colours, 0 to 1, without the gamma of sRGB (IEC 61966-2-1): as glTF has them."""
+    levels = np.clip(levels, 0.0, 1.0)
+    return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)

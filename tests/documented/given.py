@@ -10,6 +10,7 @@ from tests.documented.collecting import ROOT
 from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
 from tests.support.captures import capture
 from tests.support.hinged_humanoid import write_robot
+from tests.support.skins import skinned_glb
 
 _PROGRAM = ROOT / ".venv/bin/actuated_characters"
 
@@ -63,6 +64,15 @@ def _robots(path: Path) -> None:
     write_robot(maker / "robot.urdf")
 
 
+def _body(path: Path) -> None:
+    """A skinned mesh with the names of Mixamo, in cm."""
+    path.write_bytes(skinned_glb(scale=100.0))
+
+
+def _joints(path: Path) -> None:
+    path.write_text("left_knee: mixamorig:LeftLeg\nleft_wrist:\n", encoding="utf-8")
+
+
 def _call(path: Path, *words: object) -> None:
     command = [str(_PROGRAM), *map(str, words)]
     subprocess.run(command, cwd=path.parent, check=True, capture_output=True)
@@ -99,6 +109,8 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robot.urdf": _robot,
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
+    "body.glb": _body,
+    "joints.yaml": _joints,
     "swing.py": _code("README.md", "class Swing"),
     "holder.py": _code("docs/python.md", "class Holder"),
 }

@@ -10,17 +10,16 @@ from actuated_characters.render.engine.camera_pose import CameraPose, PixelRegio
 from actuated_characters.render.engine.ground import Samples
 from actuated_characters.render.engine.posed_characters import Frames
 from actuated_characters.render.engine.shape_meshes import (
-    NO_TEXTURE,
     TexturedSurface,
     textured_surface_of,
+    untextured,
 )
+from actuated_characters.render.engine.skin_surfaces import SkinSurfaces
 from actuated_characters.render.engine.surfaces import arrow_surface
-from actuated_characters.render.skin.skin import PosedSkin
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.geometry import fixed_order, rotations
-from msgs_config.geometry.surface import Surface
 
 LIGHT_VIEW = CameraPose(yaw=0.6, pitch=1.1, field_of_view=0.06)  # the view from the light
 
@@ -69,14 +68,6 @@ class _Skins(NamedTuple):
         )
 
 
-class Skinned(NamedTuple):
-    """The skin of one character among several."""
-
-    skin: PosedSkin
-    colors: list[Quadruple]  # of its links
-    links: slice  # which of all links are its own
-
-
 class RenderScene:
     """The links of characters and a terrain, balls and arrows, each of them shown or not."""
 
@@ -84,7 +75,7 @@ class RenderScene:
         self,
         links: Sequence[tuple[Shape, ...]],
         terrain: UrdfOptions | None = None,
-        skins: Sequence[Skinned] = (),
+        skins: Sequence[SkinSurfaces] = (),
     ) -> None:
         """Make the surfaces of the shapes of each link, but for those that skins are drawn of.
 
@@ -113,19 +104,8 @@ class RenderScene:
             skin, place = skins.surfaces[number], places[number]
             self._shown.append(_Body(skin, color, place, axes[number], _CASTS_SHADOW))
         for skinned in self._skins:
-            self._show_skin(skinned, frames, colors)
-
-    def _show_skin(
-        self, skinned: Skinned, frames: Frames, colors: Sequence[Quadruple | None]
-    ) -> None:
-        origins, turns_xyzw = (each[skinned.links] for each in frames)
-        if not np.isfinite(origins).all():
-            return
-        own = zip(colors[skinned.links], skinned.colors, strict=True)
-        chosen = [given or color for given, color in own]
-        for surface, color in skinned.skin.parts(origins, turns_xyzw, chosen):
-            body = _Body(_untextured(surface), color, np.zeros(3), np.eye(3), _CASTS_SHADOW)
-            self._shown.append(body)
+            for surface, color in skinned.surfaces(frames, colors):
+                self._shown.append(_Body(surface, color, np.zeros(3), np.eye(3), _CASTS_SHADOW))
 
     def show_terrain(self) -> None:
         """Show the terrain, if there is one."""
@@ -144,7 +124,7 @@ class RenderScene:
         for tail, tip in arrows:
             surface = arrow_surface(float(fixed_order.norm(tip - tail)), radius)
             axes = rotations.matrix(rotations.from_z(tip - tail))
-            self._shown.append(_Body(_untextured(surface), _ARROW_COLOR, tail, axes, _SEEN))
+            self._shown.append(_Body(untextured(surface), _ARROW_COLOR, tail, axes, _SEEN))
 
     def draw(self, view: CameraPose, size: Size, box: PixelRegion) -> Drawing:
         """What is seen in a part of a view's picture of a size; the part is not empty."""
@@ -178,7 +158,3 @@ class RenderScene:
         with np.errstate(divide="ignore"):
             depth: Samples = np.float32(1.0) / inverses
         return Drawing(color, depth, marks == _CASTS_SHADOW)
-
-
-def _untextured(surface: Surface) -> TexturedSurface:
-    return TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)

@@ -13,11 +13,11 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.compositor import Compositor, Picture
 from actuated_characters.render.engine.posed_characters import Frames, LinkForce, PosedCharacters
-from actuated_characters.render.engine.render_scene import RenderScene, Skinned
+from actuated_characters.render.engine.render_scene import RenderScene
+from actuated_characters.render.engine.skin_surfaces import SkinSurfaces
 from actuated_characters.render.engine.surfaces import HEAD_WIDTH
-from actuated_characters.render.skin.making import skin_of
-from actuated_characters.render.skin.palette import skin_colors
-from actuated_characters.render.skin.skin import PosedSkin
+from actuated_characters.render.skin.choosing import colors_of, skin_of
+from actuated_characters.render.skin.given import GivenSkin
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character, UrdfOptions, Vector
 from msgs_config.geometry import fixed_order
@@ -64,6 +64,7 @@ class Renderer:
         terrain: UrdfOptions | None = None,
         samples: int = 2,
         skinned: bool = False,
+        skin: GivenSkin | None = None,
     ) -> None:
         """Make the surfaces of all that may be seen.
 
@@ -76,9 +77,11 @@ class Renderer:
             skinned: Draw a smooth skin in place of the shapes that it is made from, where a
                 character has a floating base and none of its shapes is a mesh; and ghosts that
                 are where they really are as outlines, not transparent.
+            skin: With `skinned`, a mesh from a file as the skin of every character.
 
         Raises:
             CharacterError: a file of a character or of the terrain cannot be used.
+            SkinError: `skin` does not fit a character.
         """
         characters = (character,) if isinstance(character, Character) else character
         self._samples = samples
@@ -86,22 +89,23 @@ class Renderer:
         self._has_ground = ground and self.posed.stand_on_ground()
         self._has_terrain = terrain is not None
         self._skinned = skinned
-        skins = self._make_skins(characters) if skinned else []
+        self._skins = self._make_skins(characters, skin) if skinned else []
         shapes = list(self.posed.shapes)
-        for skin in skins:
-            shapes[skin.links] = [() for _ in skin.colors]
-        self._scene = RenderScene(shapes, terrain, skins)
+        for made in self._skins:
+            shapes[made.links] = [() for _ in shapes[made.links]]
+        self._scene = RenderScene(shapes, terrain, self._skins)
 
-    def _make_skins(self, characters: Sequence[Character]) -> list[Skinned]:
+    def _make_skins(
+        self, characters: Sequence[Character], given: GivenSkin | None
+    ) -> list[SkinSurfaces]:
         """The skins of those characters that have one."""
         skins, first = [], 0
         for number, character in enumerate(characters):
             links = slice(first, first + len(character.links))
             first = links.stop
-            skin = skin_of(character, self.posed.shapes_of_characters[number])
+            skin = skin_of(character, self.posed.shapes_of_characters[number], given)
             if skin is not None:
-                colors = skin_colors(character, number)
-                skins.append(Skinned(PosedSkin(skin), colors, links))
+                skins.append(SkinSurfaces(skin, colors_of(skin, character, number), links))
         return skins
 
     def picture(self, frame: FrameSpec, size: Size) -> Picture:
@@ -116,7 +120,7 @@ class Renderer:
             ghosts = (origins + frame.ghost_offset, turns_xyzw)
             self._scene.clear()
             self._scene.show_links(ghosts, [_GHOST_COLOR] * len(origins))
-            box = view.box(self.posed.spheres(ghosts), size)
+            box = view.box(self._spheres(ghosts), size)
             if self._skinned and not any(frame.ghost_offset):
                 layers.draw_outline(self._scene, box, _OUTLINE_COLOR)
             else:
@@ -131,6 +135,11 @@ class Renderer:
             layers.draw_over(self._scene, box, 1.0, _HIDDEN_ARROW_OPACITY)
         return layers.picture()
 
+    def _spheres(self, frames: Frames) -> Spheres:
+        """Spheres around all that is drawn of characters."""
+        bodies = [self.posed.spheres(frames)]
+        return Spheres.joined([*bodies, *(each.spheres(frames) for each in self._skins)])
+
     def _draw_bodies(
         self, layers: Compositor, frame: FrameSpec, frames: Frames, view: CameraPose, size: Size
     ) -> None:
@@ -139,7 +148,7 @@ class Renderer:
         self._scene.clear()
         self._scene.show_links(frames, [_MARK_COLOR if touches else None for touches in touching])
         self._scene.show_terrain()
-        bodies = self.posed.spheres(frames)
+        bodies = self._spheres(frames)
         balls = _NO_BALLS if frame.balls is None else frame.balls
         self._scene.show_balls(balls)
         if self._has_ground:

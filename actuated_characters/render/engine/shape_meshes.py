@@ -52,20 +52,21 @@ def textured_surface_of(shape: Shape) -> TexturedSurface:
     """The same with the texture of an .obj file, if its materials name one that can be read."""
     if shape.type is ShapeType.BOX:
         sides = (_CORNERS * np.array(shape.size))[_SIDES]
-        return _plain(_flat(sides[:, _HALVES].reshape(-1, 3, 3)))
+        return untextured(_flat(sides[:, _HALVES].reshape(-1, 3, 3)))
     if shape.type is not ShapeType.MESH:
-        return _plain(round_surface(shape))
+        return untextured(round_surface(shape))
     path = Path(shape.mesh)
     if path.suffix.lower() == ".obj":
         mesh = read_wavefront(path)
         surface, uvs = _surface_of_corners(mesh)
         found = TexturedSurface(surface, uvs, _read_texture(mesh.picture))
     else:
-        found = _plain(_flat(read_vertices(path).reshape(-1, 3, 3)))
+        found = untextured(_flat(read_vertices(path).reshape(-1, 3, 3)))
     return found._replace(surface=_scaled(found.surface, np.array(shape.size)))
 
 
-def _plain(surface: Surface) -> TexturedSurface:
+def untextured(surface: Surface) -> TexturedSurface:
+    """A surface of one colour."""
     return TexturedSurface(surface, np.zeros((len(surface.vertices), 2)), NO_TEXTURE)
 
 

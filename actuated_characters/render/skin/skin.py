@@ -1,4 +1,4 @@
-"""A character's skin: one closed surface, and how it is bound to the links."""
+"""A character's skin: one surface, and how it is bound to the links."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ BONES = 4
 
 @dataclass(frozen=True)
 class Skin:
-    """A closed surface in one pose, whose vertices follow up to four links each."""
+    """A surface in one pose, whose vertices follow up to four links each."""
 
     surface: Surface  # in the world, m
     owners: IntArray  # (k,): the link that each triangle is of
@@ -24,14 +24,57 @@ class Skin:
     weights: FloatArray  # (m, 4), of sum one
     origins: FloatArray  # (l, 3): of the link frames, m, world
     turns_xyzw: FloatArray  # (l, 4)
+    colors: FloatArray | None = None  # (k, 3): of the triangles, 0 to 1, if it has its own
 
-    def colored(self, colors: Sequence[Quadruple]) -> Iterator[tuple[BoolArray, Quadruple]]:
-        """Its colours rgba, where the links (l,) have these: which triangles (k,) have each."""
+    def colored(
+        self, colors: Sequence[Quadruple | None]
+    ) -> Iterator[tuple[BoolArray, Quadruple | None]]:
+        """Its colours rgba, where the links (l,) have these: which triangles (k,) have each.
+
+        None are the skin's own colours.
+        """
         for color in dict.fromkeys(colors):
             rows = [row for row, own in enumerate(colors) if own == color]
             which = np.isin(self.owners, rows)
             if which.any():
                 yield which, color
+
+    def spheres(self) -> tuple[FloatArray, FloatArray]:
+        """Centres (l, 3) in the links' frames and radii (l,), m, of all that each link moves.
+
+        Wherever the links are, the skin is within the hull of these.
+        """
+        centres, radii = np.zeros_like(self.origins), np.zeros(len(self.origins))
+        for row in range(len(self.origins)):
+            moved = ((self.bones == row) & (self.weights > 0.0)).any(axis=1)
+            if not moved.any():
+                continue
+            ways = self.surface.vertices[moved] - self.origins[row]
+            local = rotations.rotate(rotations.conjugate(self.turns_xyzw[row]), ways)
+            centres[row] = 0.5 * (local.min(axis=0) + local.max(axis=0))
+            radii[row] = fixed_order.norm(local - centres[row]).max()
+        return centres, radii
+
+    def link_colors(self) -> FloatArray | None:
+        """The mean colour of each link (l, 3), 0 to 1, if it has its own."""
+        if self.colors is None:
+            return None
+        counts = np.bincount(self.owners, minlength=len(self.origins))
+        sums = [
+            np.bincount(self.owners, channel, minlength=len(self.origins))
+            for channel in self.colors.T
+        ]
+        means: FloatArray = np.column_stack(sums) / np.maximum(counts, 1)[:, np.newaxis]
+        return means
+
+
+def strongest(weights: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The links (m, 4) that weigh most, of weights (m, l), and theirs, of sum one."""
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, :BONES]
+    shares = np.take_along_axis(weights, bones, axis=1)
+    missing = ((0, 0), (0, BONES - bones.shape[1]))
+    bones, shares = np.pad(bones, missing), np.pad(shares, missing)
+    return bones, shares / fixed_order.total(shares)[:, np.newaxis]
 
 
 class PosedSkin:
@@ -56,11 +99,3 @@ class PosedSkin:
         normals = fixed_order.total(weights * fixed_order.apply(turns, self._local_normals), axis=1)
         normals /= fixed_order.norm(normals)[:, np.newaxis]
         return Surface(vertices, normals, skin.surface.triangles)
-
-    def parts(
-        self, origins: FloatArray, turns_xyzw: FloatArray, colors: Sequence[Quadruple]
-    ) -> Iterator[tuple[Surface, Quadruple]]:
-        """The same in parts that have a colour each, of the colours (l,) of the links."""
-        whole = self.surface(origins, turns_xyzw)
-        for which, color in self.skin.colored(colors):
-            yield whole._replace(triangles=whole.triangles[which]), color

@@ -10,7 +10,8 @@ from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.outlines import outline
 from actuated_characters.render.engine.shape_meshes import surface_of
-from actuated_characters.render.skin.making import skin_of
+from actuated_characters.render.skin.choosing import skin_of
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import Skin
 from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
@@ -21,7 +22,7 @@ from actuated_characters.viewer.parameters import SHOWN
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character, Quadruple, Shape
+from msgs_config.character.model import Character, Shape
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
@@ -57,13 +58,16 @@ class DrawnCharacter:
         effort_limits: FloatArray,
         bind: Bind = _bind_nothing,
         number: int = 0,
+        skin: GivenSkin | None = None,
     ) -> None:
         """Add all nodes; limits (b,) are those of the character's physical vectors.
 
-        Its `number` among several characters says which colours its skin has.
+        Its `number` among several characters says which colours its skin has, unless `skin`, a
+        mesh from a file, is to be that.
 
         Raises:
             CharacterError: a mesh cannot be used.
+            SkinError: `skin` does not fit.
         """
         self.character, self.name, self.effort_limits = character, name, effort_limits
         self._scene, self._model = scene, DynamicsModel(character)
@@ -89,9 +93,12 @@ class DrawnCharacter:
         self._skin: DrawnSkin | None = None
         self._shows_skin = False
         self._ghost_skin: GhostSkin | None = None
-        skin = skin_of(character, shapes)
-        if skin is not None:
-            self._add_skin(skin, skin_colors(character, number))
+        made = skin_of(character, shapes, skin)
+        if made is not None:
+            colors = made.link_colors()
+            if colors is None:
+                colors = np.array(skin_colors(character, number))[:, :3]
+            self._add_skin(made, colors)
         else:
             for row, own in enumerate(shapes):
                 for k, shape in enumerate(own):
@@ -107,10 +114,13 @@ class DrawnCharacter:
         self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
         self.has_been_drawn = False
 
-    def _add_skin(self, skin: Skin, colors: Sequence[Quadruple]) -> None:
-        """Add a skin around the shapes, which are hidden by it or instead of it."""
+    def _add_skin(self, skin: Skin, colors: FloatArray) -> None:
+        """Add a skin around the shapes, which are hidden by it or instead of it.
+
+        Its links have colours (l, 3), 0 to 1.
+        """
         links = f"{self.name}/links"
-        own = [255.0 * np.array(color[:3]) for color in colors]
+        own = list(255.0 * colors)
         rgb = [_rgb(color) for color in own]
         self._skin = DrawnSkin(self._scene, links, self.character, skin, rgb)
         self._ghost_skin = GhostSkin(self._scene, f"{self.name}/ghost_skin", skin, _GHOST)

@@ -5,6 +5,7 @@ import viser
 
 from actuated_characters.bags.rebuilding import Rebuilt
 from actuated_characters.metrics.falls import reader_for
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.drawing.drawn_character import Bind, DrawnCharacter
 from actuated_characters.viewer.drawing.name_tag import TAG_HEIGHT, NameTag
 from actuated_characters.viewer.drawing.sample import CharacterSample
@@ -16,11 +17,22 @@ class LiveCharacter(DrawnCharacter):
     """A drawn character, and what its simulator says of it and of its world."""
 
     def __init__(
-        self, scene: viser.SceneApi, name: str, rebuilt: Rebuilt, bind: Bind, number: int
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        rebuilt: Rebuilt,
+        bind: Bind,
+        number: int,
+        skin: GivenSkin | None = None,
     ) -> None:
-        """Add all nodes; see DrawnCharacter. Raises CharacterError if a mesh cannot be used."""
+        """Add all nodes; see DrawnCharacter.
+
+        Raises:
+            CharacterError: a mesh cannot be used.
+            SkinError: `skin` does not fit.
+        """
         limits = rebuilt.known.effort_limits
-        super().__init__(scene, name, rebuilt.character, limits, bind, number)
+        super().__init__(scene, name, rebuilt.character, limits, bind, number, skin)
         self.rebuilt = rebuilt
         self._tag: NameTag | None = None
         if rebuilt.world.name:  # one of several

@@ -7,6 +7,7 @@ from rich.console import Console
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.robots.reading import RobotSource
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.recorded.player import RecordedPlayer
 from actuated_characters.viewer.recorded.run import check_comparable, read_run
 from actuated_characters.viewer.web.rejections import Rejections
@@ -24,11 +25,12 @@ def show_recorded(
     host: str,
     port: int | None,
     fps: float,
+    skin: GivenSkin | None = None,
 ) -> None:
     """Show a recorded run, and others as its ghosts, until an interruption.
 
     `source` says whose they are, if they are bags of another robot; `told` is called with what was
-    read.
+    read; `skin` is a mesh from a file as the skin of every character.
 
     Raises:
         ActuatedCharactersError: a recording cannot be read, the others are of other characters, or
@@ -44,7 +46,7 @@ def show_recorded(
     listening = open_socket(host, port)
     server = start_server(listening, RequestCheck(host), rejections.note)
     try:
-        player = RecordedPlayer(server, run, beside)
+        player = RecordedPlayer(server, run, beside, skin)
         for line in describe_address(host, listening.getsockname()[1]):
             print(line, flush=True)
         player.play(fps, rejections)

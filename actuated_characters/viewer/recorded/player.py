@@ -6,6 +6,7 @@ from pathlib import Path
 
 import viser
 
+from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
@@ -32,9 +33,18 @@ class RecordedPlayer:
     """Draws the state of a recorded run that the time line is at; others may be its ghosts."""
 
     def __init__(
-        self, server: viser.ViserServer, run: RecordedRun, others: Sequence[RecordedRun]
+        self,
+        server: viser.ViserServer,
+        run: RecordedRun,
+        others: Sequence[RecordedRun],
+        skin: GivenSkin | None = None,
     ) -> None:
-        """Build the scene; raises CharacterError if a mesh cannot be used."""
+        """Build the scene, with a mesh from a file as the skin of every character, if given.
+
+        Raises:
+            CharacterError: a mesh cannot be used.
+            SkinError: `skin` does not fit a character.
+        """
         self._server, self._run = server, run
         self._ghosts = {_name(other, run): other for other in others}
         self._timeline = Playback(run.times)
@@ -47,6 +57,7 @@ class RecordedPlayer:
                 each.character,
                 each.character.effort_limits(),
                 number=number,
+                skin=skin,
             )
             for number, each in enumerate(run.recordings)
         ]

@@ -20,6 +20,7 @@ from tests.support.eventful import Eventful, eventful_run, write_timed
 from tests.support.gltf import Gltf, assert_valid
 from tests.support.limits import file_size_limit
 from tests.support.physics import character
+from tests.support.skins import skinned_glb
 
 TO_FILE = [1, 2, 0]  # of x, y, z: y is up, forward is z
 RESET_AFTER = 30
@@ -156,6 +157,11 @@ def test_a_world_of_two_gives_both_and_bvh_one_of_them(
         (("walk", "--output", "nowhere/walk.glb"), ("nowhere", "does not exist")),
         (("walk", "--output", "walk.glb", "--units", "cm"), ("--units", "BVH")),
         (("walk", "--output", "walk.bvh", "--ground"), ("--ground", "glTF")),
+        (("walk", "--output", "walk.bvh", "--shapes"), ("--shapes", "glTF")),
+        (("walk", "--output", "walk.bvh", "--skin", "a.glb"), ("--skin is of glTF",)),
+        (("walk", "--output", "walk.glb", "--skin", "a.glb"), ("cannot read a.glb",)),
+        (("walk", "--output", "walk.glb", "--skin-map", "a.yaml"), ("--skin-map is of a --skin",)),
+        (("walk", "--output", "walk.glb", "--skin", "a", "--shapes"), ("one of the two",)),
         (("walk", "--output", "walk.csv", "--order", "XYZ"), ("--order is of BVH; walk.csv",)),
         (("walk", "--output", "walk.csv", "--from", "0"), ("--from is of BVH and glTF; walk.csv",)),
         (("walk", "--output", "walk.glb", "--reference"), ("--reference is of CSV; walk.glb",)),
@@ -228,6 +234,22 @@ def test_a_full_disk_leaves_what_was_there(
     assert file.read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
     assert exported("walk", "--output", file, "--overwrite") == 0
     assert_valid(Gltf.of_glb(file.read_bytes()))
+
+
+def test_a_mesh_from_a_file_follows_the_links(tmp_path: Path) -> None:
+    body, file = tmp_path / "body.glb", tmp_path / "walk.glb"
+    body.write_bytes(skinned_glb(scale=100.0))
+
+    assert exported("walk", "--output", file, "--skin", body, "--from", "0.5", "--to", "0.5") == 0
+
+    gltf = Gltf.of_glb(file.read_bytes())
+    assert_valid(gltf)
+    (upper_and_lower,) = gltf.skinned(gltf.node("skin"), 0.0)
+    assert upper_and_lower[:, 1].min() == pytest.approx(0.0, abs=0.03)  # y is up
+    assert 1.4 < upper_and_lower[:, 1].max() < 1.7
+    mesh = gltf.content["meshes"][gltf.content["nodes"][gltf.node("skin")]["mesh"]]
+    colors = gltf.numbers(mesh["primitives"][0]["attributes"]["COLOR_0"])
+    assert len(np.unique(colors.round(4), axis=0)) == 2
 
 
 def test_a_single_file_of_a_bag_will_do(bag: Path) -> None:

@@ -11,7 +11,7 @@ from actuated_characters.export.gltf_scene import make_document
 from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.ground import COLORS
 from actuated_characters.render.engine.shape_meshes import surface_of
-from actuated_characters.render.skin.making import skin_of
+from actuated_characters.render.skin.choosing import skin_of
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import PosedSkin
 from character_motion.export.trajectories import BallTrajectory, Trajectories
