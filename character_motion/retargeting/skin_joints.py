@@ -99,6 +99,8 @@ def _by_role(
     given: GivenLinks,
 ) -> list[tuple[int, int]]:
     """Links with joints that are the same part of a body on two legs; none if one is no such."""
+    # What several trees hang on may be no joint of the skin; here it is the first joint.
+    parents = [-1, *(max(parent, 0) for parent in parents[1:])]
     try:
         target = find_target_joints(character, None).map.joints
         told = {role: given.get(character.links[row].name) for role, row in target.items()}
