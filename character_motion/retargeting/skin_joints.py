@@ -91,6 +91,27 @@ def find_skin_joints(
     return found
 
 
+def joint_centres(character: Character, origins: FloatArray, turns_xyzw: FloatArray) -> FloatArray:
+    """The point (l, 3) about which each link turns, in a pose of link frames, m.
+
+    It is the frame's origin, but where several hinges that cross are one joint of a body.
+
+    Args:
+        character: Whose links.
+        origins: Of their frames (l, 3), m.
+        turns_xyzw: Of these (l, 4).
+    """
+    centres = origins.copy()
+    try:
+        target = find_target_joints(character, None)
+    except ClipError:
+        return centres
+    for role, row in target.map.joints.items():
+        if len(target.joints.get(role, ())) > 1:
+            centres[row] = target.centre(role, character.links, origins, turns_xyzw)
+    return centres
+
+
 def _by_role(
     names: Sequence[str],
     parents: Sequence[int],
@@ -102,7 +123,12 @@ def _by_role(
     # What several trees hang on may be no joint of the skin; here it is the first joint.
     parents = [-1, *(max(parent, 0) for parent in parents[1:])]
     try:
-        target = find_target_joints(character, None).map.joints
+        found = find_target_joints(character, None)
+        # A hinge of a shoulder may be called as a collar is.
+        hinges = {row: role for role, rows in found.joints.items() for row in rows}
+        target = {
+            role: row for role, row in found.map.joints.items() if hinges.get(row, role) == role
+        }
         told = {role: given.get(character.links[row].name) for role, row in target.items()}
         known = {role: joint for role, joint in told.items() if joint is not None}
         own = dict(find_map("", names, parents, known).joints)

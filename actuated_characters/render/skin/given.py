@@ -17,7 +17,12 @@ from character_motion.export.upright import UPRIGHT_XYZW
 from character_motion.gltf.reading import GlbFile
 from character_motion.gltf.skinned_mesh import SkinnedMesh, read_skinned_mesh
 from character_motion.retargeting.conventions import quaternion
-from character_motion.retargeting.skin_joints import GivenLinks, find_skin_joints, read_skin_map
+from character_motion.retargeting.skin_joints import (
+    GivenLinks,
+    find_skin_joints,
+    joint_centres,
+    read_skin_map,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.lowest_points import lowest_heights
@@ -82,6 +87,7 @@ class _Fit:
                 )
         model = still_model(character, rest)
         self._origins, self._turns = model.link_poses()
+        self._centres = joint_centres(character, self._origins, self._turns)
         self._lowest = lowest_heights(character, model)
         self._top = min(joints)
         self._parents = [link.parent for link in character.links]
@@ -102,7 +108,7 @@ class _Fit:
     def _ways(self, row: int) -> tuple[FloatArray, FloatArray]:
         """From a link's joint to the next ones (k, 3): the character's at rest, m; the mesh's."""
         after = self._next[row]
-        own = self._origins[after] - self._origins[row]
+        own = self._centres[after] - self._centres[row]
         joints = [self._joints[each] for each in after]
         theirs = self._places[joints] - self._places[self._joints[row]]
         return own.reshape(-1, 3), theirs.reshape(-1, 3)
@@ -125,7 +131,8 @@ class _Fit:
         vertices = np.zeros_like(self._surface.vertices)
         for row, joint in self._joints.items():
             ways = self._surface.vertices - self._places[joint]
-            vertices += weights[:, row, np.newaxis] * (origins[row] + self._scale(row) * ways)
+            centre = origins[row] + self._from_origin(turned, row)
+            vertices += weights[:, row, np.newaxis] * (centre + self._scale(row) * ways)
         corners = weights[self._surface.triangles].sum(axis=1)
         return Skin(
             self._surface._replace(vertices=vertices),
@@ -154,7 +161,7 @@ class _Fit:
         """Where the links (l, 3) are then, m, the first with a joint where that joint is."""
         origins = np.zeros_like(self._origins)
         row = self._top
-        origins[row] = self._places[self._joints[row]]
+        origins[row] = self._places[self._joints[row]] - self._from_origin(turned, row)
         above = [row]
         while (parent := self._parents[above[-1]]) >= 0:
             way = self._origins[above[-1]] - self._origins[parent]
@@ -166,11 +173,15 @@ class _Fit:
                 origins[row] = origins[parent] + rotations.rotate(turned[parent], way)
         return origins
 
+    def _from_origin(self, turned: FloatArray, row: int) -> FloatArray:
+        """The way (3,) from a link's origin to the centre of its joint then, m."""
+        return rotations.rotate(turned[row], self._centres[row] - self._origins[row])
+
     def _scale(self, row: int) -> float:
         """By how much the mesh grows around a link's joint."""
         own, theirs = (float(np.linalg.norm(each, axis=1).sum()) for each in self._ways(row))
         if self._character.links[row].name in self._character.feet and not self._next[row]:
-            own = float(self._origins[row, 2] - self._lowest[row])
+            own = float(self._centres[row, 2] - self._lowest[row])
             theirs = float(self._places[self._joints[row], 2] - self._surface.vertices[:, 2].min())
         if not (own > 0.0 and theirs > 0.0):
             return self._whole

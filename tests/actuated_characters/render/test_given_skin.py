@@ -15,8 +15,10 @@ from actuated_characters.render.skin.choosing import skin_of
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.skin.skin import PosedSkin, Skin
 from msgs_config.arrays import FloatArray
+from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.geometry import rotations
+from tests.support.hinged_humanoid import write_robot
 from tests.support.physics import character, random_state
 from tests.support.skins import (
     BLUE,
@@ -124,6 +126,30 @@ def test_a_mesh_of_other_proportions_has_its_joints_where_the_links_are(tmp_path
         for each in (skin, bound)
     ]
     assert heights[0] == pytest.approx(heights[1], abs=OF_FEET)
+
+
+def test_hinges_that_cross_are_one_joint(tmp_path: Path) -> None:
+    """Of a robot whose hips are three hinges the thighs of the mesh are as long as its own."""
+    robot = load_character(str(write_robot(tmp_path / "robot.urdf")))
+    rows = {link.name: row for row, link in enumerate(robot.links)}
+    mesh = given(tmp_path, skinned_glb())
+
+    skin, humanoid, bound = mesh.fitted(robot), character("humanoid"), bound_skin()
+
+    names = [link.name for link in humanoid.links]
+    order = rows_in_file()
+    for side in ("left", "right"):
+        shared = np.array(
+            [
+                (bound.weights * (bound.bones == names.index(f"{side}_{part}"))).sum(axis=1)[order]
+                > 0.3
+                for part in ("hip", "knee")
+            ]
+        ).all(axis=0)
+        knee = skin.origins[rows[f"{side}_knee_link"]]
+        around = skin.surface.vertices[shared].mean(axis=0) - knee
+        assert np.linalg.norm(around) < 0.03
+        assert (skin.weights[skin.bones == rows[f"{side}_shoulder_pitch_link"]] == 0.0).all()
 
 
 def test_triangles_have_the_colours_of_their_materials(tmp_path: Path) -> None:
