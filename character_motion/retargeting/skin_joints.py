@@ -61,15 +61,7 @@ def find_skin_joints(
         SkinError: a name that is given does not exist, or a link that moves has no joint.
     """
     links = [link.name for link in character.links]
-    found: dict[int, int] = {}
-    for link, joint in given.items():
-        if link not in links:
-            raise SkinError(f"{place}: skin map: {one_of('link', link, links)}")
-        if joint is not None:
-            if joint not in names:
-                shown = list(names)[:_SHOWN_NAMES]
-                raise SkinError(f"{place}: skin map: {link}: {one_of('joint', joint, shown)}")
-            found[links.index(link)] = list(names).index(joint)
+    found = _given_joints(place, names, links, given)
     left_out = {links.index(link) for link in given}
     roles = _by_role(names, parents, places, character, given)
     for row, number in (*roles, *_by_name(names, links)):
@@ -88,6 +80,26 @@ def find_skin_joints(
             f"{place}: no joint found for {', '.join(missing)}; name them in a file for "
             f"--skin-map, such as '{missing[0]}: NAME'; joints: {', '.join(names[:_SHOWN_NAMES])}"
         )
+    return found
+
+
+def _given_joints(
+    place: object, names: Sequence[str], links: Sequence[str], given: GivenLinks
+) -> dict[int, int]:
+    """The joints that are given, by the numbers of links."""
+    found: dict[int, int] = {}
+    for link, joint in given.items():
+        if link not in links:
+            raise SkinError(f"{place}: skin map: {one_of('link', link, list(links))}")
+        if joint is None:
+            continue
+        if joint not in names:
+            shown = list(names)[:_SHOWN_NAMES]
+            raise SkinError(f"{place}: skin map: {link}: {one_of('joint', joint, shown)}")
+        number = list(names).index(joint)
+        if number in found.values():
+            raise SkinError(f"{place}: skin map: {link}: another link has joint '{joint}'")
+        found[links.index(link)] = number
     return found
 
 

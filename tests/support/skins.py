@@ -91,16 +91,7 @@ def skinned_glb(
     humanoid, skin = character("humanoid"), bound_skin()
     document = GltfDocument("an artist's program")
     places = scale * (skin.origins @ _Y_UP.T)
-    nodes: dict[int, int] = {}
-    for row, link in enumerate(humanoid.links):
-        if link.name in names:
-            above = link.parent
-            while above not in nodes and above >= 0:
-                above = humanoid.links[above].parent
-            way = places[row] - (places[above] if above >= 0 else 0.0)
-            nodes[row] = document.add_node(
-                names[link.name], nodes.get(above), translation=np.asarray(way)
-            )
+    nodes = _add_joints(document, names, places)
     numbers = {row: number for number, row in enumerate(nodes)}
     binds = np.tile(np.eye(4), (len(nodes), 1, 1))
     binds[:, :3, 3] = -places[list(nodes)]
@@ -119,6 +110,23 @@ def skinned_glb(
     document.add_node("body", mesh=document.add_mesh_of("body", parts), skin=number)
     raw = document.to_glb()
     return raw if edit is None else edited(raw, edit)
+
+
+def _add_joints(
+    document: GltfDocument, names: Mapping[str, str], places: FloatArray
+) -> dict[int, int]:
+    """Add the joints at the places (l, 3) of links; the numbers of their nodes by links."""
+    nodes: dict[int, int] = {}
+    for row, link in enumerate(character("humanoid").links):
+        if link.name in names:
+            above = link.parent
+            while above not in nodes and above >= 0:
+                above = character("humanoid").links[above].parent
+            way = places[row] - (places[above] if above >= 0 else 0.0)
+            nodes[row] = document.add_node(
+                names[link.name], nodes.get(above), translation=np.asarray(way)
+            )
+    return nodes
 
 
 def edited(raw: bytes, edit: Callable[[dict[str, Any]], None]) -> bytes:

@@ -95,10 +95,7 @@ class DrawnCharacter:
         self._ghost_skin: GhostSkin | None = None
         made = skin_of(character, shapes, skin)
         if made is not None:
-            colors = made.link_colors()
-            if colors is None:
-                colors = np.array(skin_colors(character, number))[:, :3]
-            self._add_skin(made, colors)
+            self._add_skin(made, number)
         else:
             for row, own in enumerate(shapes):
                 for k, shape in enumerate(own):
@@ -114,11 +111,11 @@ class DrawnCharacter:
         self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
         self.has_been_drawn = False
 
-    def _add_skin(self, skin: Skin, colors: FloatArray) -> None:
-        """Add a skin around the shapes, which are hidden by it or instead of it.
-
-        Its links have colours (l, 3), 0 to 1.
-        """
+    def _add_skin(self, skin: Skin, number: int) -> None:
+        """Add a skin around the shapes, which are hidden by it or instead of it."""
+        colors = skin.link_colors()
+        if colors is None:
+            colors = np.array(skin_colors(self.character, number))[:, :3]
         links = f"{self.name}/links"
         own = list(255.0 * colors)
         rgb = [_rgb(color) for color in own]

@@ -296,6 +296,10 @@ def test_what_is_no_glb_is_one_line(raw: bytes, part: str, tmp_path: Path) -> No
             ("unknown link 'left_kneee'", "mean 'left_knee'"),
         ),
         ("left_knee: LeftLeg", ("unknown joint 'LeftLeg'", "mixamorig:LeftLeg")),
+        (
+            "left_knee: mixamorig:LeftLeg\nleft_hip: mixamorig:LeftLeg",
+            ("left_hip", "another link", "LeftLeg"),
+        ),
         ("left_knee: [1, 2]", ("left_knee", "a text")),
         ("- left_knee", ("joints.yaml",)),
     ],
