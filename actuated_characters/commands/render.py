@@ -30,7 +30,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "render",
         help="draw pictures or a movie of a recorded run",
         description="Draw a recorded run as pictures side by side, in one PNG file; with --video "
-        "or an --output that ends in .mp4, as a movie. Arrows are pushes since the last picture.",
+        "or an --output that ends in .mp4, as a movie. Arrows are pushes.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
         "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3; "
         "actuated_characters render runs/demo --skin body.glb; "
@@ -60,7 +60,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "--count",
         type=int,
         metavar="N",
-        help=f"so many pictures, evenly from first to last ({_COUNT})",
+        help=f"so many pictures, evenly from first to last, or where a push acts ({_COUNT})",
     )
     add("--columns", type=int, metavar="N", help="pictures in a row (all, up to 8)")
     add = render.add_argument_group("movie").add_argument

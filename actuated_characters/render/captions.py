@@ -41,6 +41,7 @@ def _line(text: str, width: int, height: int, left: float) -> Picture:
     figure = Figure(figsize=((width + 0.5) / _DPI, (height + 0.5) / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
     align = "center" if left == 0.5 else "left"
-    figure.text(left, 0.5, text, ha=align, va="center", fontsize=0.7 * height)
+    size = min(0.7 * height, 1.8 * width / max(len(text), 1))  # a long text in smaller letters
+    figure.text(left, 0.5, text, ha=align, va="center", fontsize=size)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()

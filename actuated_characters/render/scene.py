@@ -1,14 +1,16 @@
 """What there is to be seen of a recording: the characters of one world, state by state."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
 from actuated_characters.render.engine.posed_characters import LinkForce
 from actuated_characters.render.engine.renderer import FrameSpec
+from actuated_characters.render.pushed_stills import Ticks
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -74,25 +76,50 @@ class RecordedScene:
         return self.recordings[0].episode_rows
 
     def frames(
-        self, rows: IntArray, captions: Sequence[str], *, ghosts: bool, contacts: bool = False
+        self,
+        rows: IntArray,
+        captions: Sequence[str],
+        *,
+        ghosts: bool,
+        contacts: bool = False,
+        pushes: Sequence[Sequence[Ticks]] | None = None,
     ) -> list[FrameSpec]:
         """What pictures of some states (p,) show, without their views; captions (p,).
 
         With the references as ghosts if wanted, and with the links marked that touched something.
         Pushes and contacts are those of the ticks since the state before, and of the one that led
-        to the first state. Of a link its strongest push is shown. The recording's strongest push
-        has the longest arrow, and none has less than a part of it.
+        to the first state; `pushes` says otherwise of which ticks each picture's (p,) are. Of a
+        link its strongest push is shown. The recording's strongest push has the longest arrow, and
+        none has less than a part of it.
         """
+        since = list(_ticks(rows))
+        pushes = [[each] for each in since] if pushes is None else pushes
         return [
             FrameSpec(
                 self.position[row],
                 ghost=self.reference[row] if ghosts else None,
-                forces=self._forces(*ticks),
+                forces=self._forces(pushed),
                 touching=self._touching(*ticks) if contacts else None,
                 balls=self._balls(row),
                 caption=caption,
             )
-            for row, ticks, caption in zip(rows.tolist(), _ticks(rows), captions, strict=True)
+            for row, ticks, pushed, caption in zip(
+                rows.tolist(), since, pushes, captions, strict=True
+            )
+        ]
+
+    def push_ticks(self) -> list[Ticks]:
+        """The ticks of each push: those one after another in which one link was pushed."""
+        acted: dict[int, list[int]] = {}
+        for links, tick, acting in self._acting_at("applied_wrench", 0, None):
+            norms = _norms(acting).tolist()
+            for link in {n for n, norm in zip(acting.links, norms, strict=True) if norm > 0.0}:
+                if link in links:
+                    acted.setdefault(links[link], []).append(tick)
+        return [
+            (int(part[0]), int(part[-1]) + 1)
+            for ticks in acted.values()
+            for part in np.split(ticks, np.flatnonzero(np.diff(ticks) > 1) + 1)
         ]
 
     def _balls(self, row: int) -> FloatArray | None:
@@ -116,9 +143,10 @@ class RecordedScene:
             touched[[links[name] for name in acting.links if name in links]] = True
         return touched
 
-    def _forces(self, begin: int, end: int) -> tuple[LinkForce, ...]:
+    def _forces(self, pushed: Iterable[Ticks]) -> tuple[LinkForce, ...]:
+        """The strongest push of each link in some ticks."""
         strongest: dict[int, tuple[float, LinkForce]] = {}
-        for links, acting in self._acting("applied_wrench", begin, end):
+        for links, acting in chain(*(self._acting("applied_wrench", *each) for each in pushed)):
             for number, norm in enumerate(_norms(acting).tolist()):
                 link = links.get(acting.links[number])
                 if link is None or norm == 0.0 or norm <= strongest.get(link, (0.0,))[0]:
@@ -134,12 +162,21 @@ class RecordedScene:
         self, what: str, begin: int, end: int | None
     ) -> Iterator[tuple[dict[str, int], WrenchArrays]]:
         """Contacts or pushes in ticks from one to before another, and links by their names."""
+        for links, _, acting in self._acting_at(what, begin, end):
+            yield links, acting
+
+    def _acting_at(
+        self, what: str, begin: int, end: int | None
+    ) -> Iterator[tuple[dict[str, int], int, WrenchArrays]]:
+        """The same, with the tick of each."""
         first = 0
         for recording in self.recordings:
             names = [link.name for link in recording.character.links]
             links = {name: first + row for row, name in enumerate(names)}
             wrenches: Wrenches = getattr(recording, what)
-            yield from ((links, acting) for acting in wrenches[begin:end] if acting is not None)
+            for tick, acting in enumerate(wrenches[begin:end], start=begin):
+                if acting is not None:
+                    yield links, tick, acting
             first += len(names)
 
     @cached_property

@@ -22,6 +22,7 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
+from actuated_characters.render.pushed_stills import PushedStills, place_stills
 from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from actuated_characters.render.skin.given import GivenSkin
 from msgs_config.arrays import FloatArray, IntArray
@@ -71,11 +72,14 @@ def strip(
 ) -> Picture:
     """Pictures of a run side by side, all of one scale; each follows the root along the ground.
 
-    Arrows are the pushes since the picture before; in the first one, those that led to it.
+    Arrows are the pushes that act then. Where one acts between two pictures, the nearest one is
+    taken in its middle instead; if `times` are given, or there is none, the nearest one shows it,
+    and the line above it says when it began.
 
     Args:
         recording: The run, or those of several characters of one world.
-        times: When, s since the first state; or how many pictures, evenly from start to end.
+        times: When, s since the first state; or how many pictures, evenly from start to end but
+            for those that are moved to a push.
         start: The first picture's time in s, where `times` is a number.
         end: The last one's; None is the last state's.
         columns: Pictures in a row.
@@ -94,11 +98,20 @@ def strip(
     rows = _rows(scene, times, start, end)
     if ghost and not scene.has_reference:
         raise RecordingError("the recording has no reference to draw")
-    captions = [f"{time:.2f} s" if labels else "" for time in scene.times[rows]]
-    frames = scene.frames(rows, captions, ghosts=ghost)
+    stills = place_stills(rows, scene.push_ticks(), moves=isinstance(times, int))
+    captions = _captions(scene.times, stills) if labels else [""] * len(rows)
+    frames = scene.frames(stills.rows, captions, ghosts=ghost, pushes=stills.ticks())
     world = WorldSettings(ground=scene.ground, terrain=scene.terrain)
     look = _Look(skinned, skin)
     return _draw_strip(scene.characters, world, frames, columns, size, look, progress)
+
+
+def _captions(times: FloatArray, stills: PushedStills) -> list[str]:
+    """When each still is, and the first of the pushes began that it shows before or after them."""
+    return [
+        f"{times[row]:.2f} s" + "".join(f", push {times[begin]:.2f} s" for begin, _ in others[:1])
+        for row, others in zip(stills.rows.tolist(), stills.others, strict=True)
+    ]
 
 
 def pose_strip(

@@ -13,6 +13,7 @@ from actuated_characters.metrics.error_measures import effort_sizes, limit_share
 from actuated_characters.metrics.recording_metrics import (
     contact_series,
     measure_recording,
+    push_spans,
     saturated_shares,
     tracking_errors,
 )
@@ -102,7 +103,8 @@ class CharacterReport:
         content = BytesIO()
         imsave(content, poses, format="png")
         ghost = "; the reference is the ghost" if self._has_reference else ""
-        text = f"{recording.character.name}, evenly from the first state to the last{ghost}"
+        pushes = ", pushes while they act" if push_spans(recording) else ""
+        text = f"{recording.character.name}, evenly from the first state to the last{pushes}{ghost}"
         return [Illustration(self._prefix + "strip", content.getvalue(), text)], []
 
     def _tracking(self) -> Section:

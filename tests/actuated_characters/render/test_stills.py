@@ -124,17 +124,54 @@ def test_a_part_of_a_run_has_its_own_pictures(recording: Recording) -> None:
     np.testing.assert_array_equal(part, strip(recording, [0.1, 0.15, 0.2], size=SIZE))
 
 
-def test_a_push_is_an_arrow_in_the_first_picture_after_it(recording: Recording) -> None:
+def pushed(recording: Recording, *ticks: int) -> Recording:
+    """The recording with a push to the left in some of its 60 ticks."""
     push = WrenchArrays.of_rows(0, ["root"], [(0.0, 90.0, 0.0, 0.0, 0.0, 0.0)], [])
-    pushed = replace(recording, applied_wrench=(*[None] * 25, push, *[None] * 34))
+    return replace(
+        recording, applied_wrench=tuple(push if tick in ticks else None for tick in range(60))
+    )
 
-    pictures = tiles(strip(pushed, [0.1, 0.15, 0.2], labels=False, size=SIZE), 3)
 
+def test_a_push_between_two_stills_is_seen_while_it_acts(recording: Recording) -> None:
+    short = pushed(recording, *range(36, 41))  # from 0.15 s to 41 / 240 s; stills 0.125 s apart
+
+    seen = strip(short, 3, size=SIZE)
+
+    # the still in the middle is the one that is moved: the state 39 in the middle of the push
+    expected = strip(short, [0.0, 39.0 / 240.0, 0.25], size=SIZE)
+    np.testing.assert_array_equal(seen, expected)
+    caption = seen.shape[0] - SIZE[1]
+    pictures = tiles(seen[caption:], 3)
     assert [bool(arrow_pixels(each) > 10) for each in pictures] == [False, True, False]
-    still = strip(pushed, [26.0 / 240.0], labels=False, size=SIZE)
+
+
+def test_a_still_in_a_push_stays_where_it_is(recording: Recording) -> None:
+    long = pushed(recording, *range(20, 40))
+
+    pictures = tiles(strip(long, 3, labels=False, size=SIZE), 3)
+
+    alike = tiles(strip(long, [0.0, 0.125, 0.25], labels=False, size=SIZE), 3)
+    np.testing.assert_array_equal(pictures, alike)
+    assert [bool(arrow_pixels(each) > 10) for each in pictures] == [False, True, False]
+
+
+def test_at_given_times_a_push_is_in_the_nearest_still_which_says_when_it_acted(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short, told = pushed(recording, 27), list[str]()
+    monkeypatch.setattr(
+        "actuated_characters.render.stills.captioned",
+        lambda picture, caption: (told.append(caption), picture)[1],
+    )
+
+    pictures = tiles(strip(short, [0.1, 0.15, 0.2], size=SIZE), 3)
+
+    assert told == ["0.10 s, push 0.11 s", "0.15 s", "0.20 s"]
+    assert [bool(arrow_pixels(each) > 10) for each in pictures] == [True, False, False]
+    still = strip(short, [28.0 / 240.0], labels=False, size=SIZE)
     assert arrow_pixels(still) > 10  # that tick led to it
     later = {"start": 0.15, "labels": False, "size": SIZE}
-    np.testing.assert_array_equal(strip(pushed, 2, **later), strip(recording, 2, **later))
+    np.testing.assert_array_equal(strip(short, 2, **later), strip(recording, 2, **later))
 
 
 def test_poses_have_one_scale_and_their_captions(walk: Made) -> None:
