@@ -35,7 +35,11 @@ setup(
             "behaviours/state_machine/data/*.yaml",
             "planner/policy/shipped/*.npz",
         ],
-        "actuated_characters": ["scenes/*.yaml", "scenes/data/*"],
+        "actuated_characters": [
+            "scenes/*.yaml",
+            "scenes/data/*",
+            "viewer/recorded/time_bar.*s",
+        ],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -45,26 +46,24 @@ _MOMENTS: dict[str, dict[str, Any]] = {
 }
 
 
+def mode_colors(events: Sequence[Event]) -> dict[str, str]:
+    """The colour (#rrggbb) of each mode, and of each state of a machine, in their order."""
+    names = list(dict.fromkeys(each.label for each in events if each.kind == MODE))
+    others = [name for name in names if name not in _MODE_COLORS]
+    colors = {name: _OTHER_MODES[place % len(_OTHER_MODES)] for place, name in enumerate(others)}
+    return {name: to_hex(_MODE_COLORS.get(name) or colors[name]) for name in names}
+
+
 @dataclass(frozen=True)
 class Marks:
     """The events of a run as marks on its charts."""
 
     events: Sequence[Event] = ()
 
-    @property
-    def _mode_colors(self) -> dict[str, str]:
-        """The colour of each mode, and of each state of a machine, in their order."""
-        names = list(dict.fromkeys(each.label for each in self.events if each.kind == MODE))
-        others = [name for name in names if name not in _MODE_COLORS]
-        colors = {
-            name: _OTHER_MODES[place % len(_OTHER_MODES)] for place, name in enumerate(others)
-        }
-        return {name: _MODE_COLORS.get(name) or colors[name] for name in names}
-
     def draw(self, axes: Axes, *, filled: bool = True) -> None:
         """Draw them over a panel whose x is time; not filled, where colours have a meaning."""
         band = (1.0 - _BAND, 1.0) if filled else (1.0, 1.0 + _BAND_ABOVE)
-        colors = self._mode_colors
+        colors = mode_colors(self.events)
         for event in self.events:
             start, end = event.start, event.start + event.duration
             if event.kind == MODE:
@@ -85,7 +84,9 @@ class Marks:
         handles: list[Line2D | Patch] = []
         if PUSH in kinds:
             handles.append(Patch(color=_PUSH_COLOR, alpha=0.5, label=PUSH))
-        handles += [Patch(color=color, label=mode) for mode, color in self._mode_colors.items()]
+        handles += [
+            Patch(color=color, label=mode) for mode, color in mode_colors(self.events).items()
+        ]
         handles += [
             Line2D([], [], label=kind, **style) for kind, style in _MOMENTS.items() if kind in kinds
         ]

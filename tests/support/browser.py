@@ -4,6 +4,7 @@ https://chromedevtools.github.io/devtools-protocol/
 """
 
 import base64
+import copy
 import fcntl
 import io
 import json
@@ -68,16 +69,32 @@ class Browser:
         wait_until(
             lambda: told.exists() and len(told.read_text().splitlines()) > 1, "chromium", _PATIENCE
         )
-        port = told.read_text().splitlines()[0]
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list", timeout=10.0) as listed:
-            pages = [each for each in json.load(listed) if each["type"] == "page"]
+        self._port = told.read_text().splitlines()[0]
+        pages = [each for each in self._ask("list") if each["type"] == "page"]
+        self._attach(pages[0])
+
+    def _ask(self, what: str, method: str = "GET") -> Any:
+        """Ask the browser itself."""
+        address = f"http://127.0.0.1:{self._port}/json/{what}"
+        request = urllib.request.Request(address, method=method)
+        with urllib.request.urlopen(request, timeout=10.0) as response:
+            return json.load(response)
+
+    def _attach(self, page: dict[str, Any]) -> None:
+        """Be about a page that the browser has told of."""
         self._page: ClientConnection = connect(
-            pages[0]["webSocketDebuggerUrl"], max_size=None, ping_interval=None
+            page["webSocketDebuggerUrl"], max_size=None, ping_interval=None
         )
         self._number = 0
         self.console: list[str] = []
         self.call("Page.enable")
         self.call("Runtime.enable")
+
+    def another_page(self) -> "Browser":
+        """A further page of the same Chromium, which ends with it."""
+        page = copy.copy(self)
+        page._attach(self._ask("new", "PUT"))
+        return page
 
     def call(self, method: str, **parameters: object) -> dict[str, Any]:
         """Call a method of the protocol, and wait for its result."""

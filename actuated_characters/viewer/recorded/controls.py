@@ -14,7 +14,7 @@ from actuated_characters.viewer.recorded.timeline import Playback
 
 NO_GHOST, REFERENCE = "none", "reference"
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-_PLAY, _PAUSE, _BACK, _NEXT, _START = "Play", "Pause", "-1", "+1", "Start"
+_PLAY, _PAUSE, _BACK, _NEXT, _START, _END = "Play", "Pause", "-1", "+1", "Start", "End"
 _PNG, _MP4, _CANCEL = "PNG", "MP4", "Cancel"
 _OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
 
@@ -75,10 +75,11 @@ class RecordedPanel:
         gui, timeline = self._gui, self._timeline
         first = float(timeline.times[0])
         end = max(timeline.end, first + 1e-3)
-        self._slider: Any = gui.add_slider("Time (s)", first, end, 1e-3, initial_value=first)
-        self._on(self._slider, self._seek)
-        buttons = gui.add_button_group("Playback", (_PLAY, _PAUSE, _BACK, _NEXT, _START))
-        self._on(buttons, self._move, click=True)
+        self.slider: Any = gui.add_slider("Time (s)", first, end, 1e-3, initial_value=first)
+        self._on(self.slider, self._seek)
+        moves = (_PLAY, _PAUSE, _BACK, _NEXT, _START, _END)
+        self.playback: Any = gui.add_button_group("Playback", moves)
+        self._on(self.playback, self._move, click=True)
         speed: Any = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
         self._on(speed, lambda label: setattr(timeline, "speed", float(label)))
         loop: Any = gui.add_checkbox("Loop", initial_value=False)
@@ -96,6 +97,8 @@ class RecordedPanel:
             timeline.plays = False
         elif button == _START:
             timeline.seek(float(timeline.times[0]))
+        elif button == _END:
+            timeline.seek(timeline.end)
         else:
             timeline.step(-1 if button == _BACK else 1)
 
@@ -164,7 +167,7 @@ class RecordedPanel:
         )
         if self._state.content != text:
             self._state.content = text
-            self._slider.value = round(timeline.time, 3)
+            self.slider.value = round(timeline.time, 3)
 
     def tell(self, sentence: str) -> None:
         """Show a sentence as it is; none if it is empty."""

@@ -19,10 +19,13 @@ from actuated_characters.viewer.recorded.export import (
     save_picture,
 )
 from actuated_characters.viewer.recorded.forking import Fork
+from actuated_characters.viewer.recorded.marks import find_marks
 from actuated_characters.viewer.recorded.plots import Plots, curves
 from actuated_characters.viewer.recorded.run import RecordedRun, check_comparable, read_run
+from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import Playback, frame_times
 from actuated_characters.viewer.web.rejections import Rejections
+from actuated_characters.viewer.web.server import ViewerServer
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
@@ -34,7 +37,7 @@ class RecordedPlayer:
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        server: ViewerServer,
         run: RecordedRun,
         others: Sequence[RecordedRun],
         skin: GivenSkin | None = None,
@@ -42,8 +45,7 @@ class RecordedPlayer:
         """Build the scene, with a mesh from a file as the skin of every character, if given.
 
         Raises:
-            CharacterError: a mesh cannot be used.
-            SkinError: `skin` does not fit a character.
+            ActuatedCharactersError: a mesh or `skin` cannot be used, or a bag cannot be read again.
         """
         self._server, self._run = server, run
         self._ghosts = {_name(other, run): other for other in others}
@@ -64,6 +66,10 @@ class RecordedPlayer:
         self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
         self._panel = RecordedPanel(server.gui, self._scene, self._timeline, self._actions, self)
         self._panel.choose_ghosts(list(self._ghosts), next(iter(self._ghosts), REFERENCE))
+        panel = self._panel
+        self._bar = TimeBar(server, self._timeline, panel.slider, panel.playback)
+        self._marks = find_marks(run)
+        self._marked: str | None = None  # the ghost whose marks are shown
         self._plots = Plots(server.gui)
         self._curves: Mapping[str, Mapping[str, FloatArray]] = {
             each.name or each.character.name: curves(each) for each in run.recordings
@@ -115,12 +121,24 @@ class RecordedPlayer:
                 self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)
             self._radii = radii
             self._scene.follow_characters(self._drawn, seconds)
+            self._mark(chosen)
+            self._bar.show_time()
         self._panel.show_time(self._run.name)
         plotted = str(self._panel.character.value)
         if plotted != self._plotted and plotted in self._curves:
             self._plotted = plotted
             self._plots.choose(self._run.times, self._curves[plotted])
         self._plots.point_at(now)
+
+    def _mark(self, chosen: str) -> None:
+        """Have the time line show the marks of the run, and of the chosen ghost if it is a run."""
+        if chosen == self._marked:
+            return
+        self._marked, other = chosen, self._ghosts.get(chosen)
+        if other is None:
+            self._bar.mark(self._marks)
+        else:
+            self._bar.mark(self._marks, chosen, find_marks(other))
 
     def save_picture(self, client: viser.ClientHandle) -> None:
         """Save what a client sees beside the run."""

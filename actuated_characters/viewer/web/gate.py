@@ -13,6 +13,7 @@ from websockets.http11 import Request, Response
 
 from actuated_characters.viewer.web.connection import MOST_BYTES, CheckedConnection, Reject
 from actuated_characters.viewer.web.message_check import MessageCheck
+from actuated_characters.viewer.web.page_parts import PageParts
 from actuated_characters.viewer.web.request_check import RequestCheck
 
 _PROTOCOL = f"viser-v{viser.__version__}"
@@ -63,8 +64,8 @@ Serve = Callable[[ServerConnection, Request], Response | None]
 class ServerGate:
     """Checks requests and messages for one server; closed until viser is whole."""
 
-    def __init__(self, check: RequestCheck, reject: Reject) -> None:
-        self.reject = reject
+    def __init__(self, check: RequestCheck, reject: Reject, parts: PageParts) -> None:
+        self.reject, self._parts = reject, parts
         self._check = check
         self._messages: MessageCheck | None = None
 
@@ -124,19 +125,25 @@ class ServerGate:
             return response
         if upgrades and _PROTOCOL not in _protocols(request):
             return respond(HTTPStatus.BAD_REQUEST, f"this server speaks {_PROTOCOL}\n")
+        text = self._parts.texts.get(request.path.partition("?")[0])
+        if text is not None:
+            response = respond(HTTPStatus.OK, text())
+            del response.headers["Content-Type"]
+            response.headers["Content-Type"] = "application/json"
+            return response
         try:
             if "Accept-Encoding" in request.headers:  # what is zipped could not be added to
                 del request.headers["Accept-Encoding"]
             page = serve(connection, request)
-            return page if page is None else _with_script(page)
+            return page if page is None else _with_head(page, _ADDED_SCRIPT + self._parts.head())
         except Exception as error:  # a request that viser does not understand ends no connection
             self.reject(f"rejected a request: {error!r}")
             return respond(HTTPStatus.BAD_REQUEST, "this request is not understood\n")
 
 
-def _with_script(response: Response) -> Response:
-    """A response, with the script that is added to a page of it."""
-    body = response.body.replace(b"<head>", b"<head>" + _ADDED_SCRIPT, 1)
+def _with_head(response: Response, added: bytes) -> Response:
+    """A response, with more at the beginning of its head if it is a page."""
+    body = response.body.replace(b"<head>", b"<head>" + added, 1)
     if body != response.body:
         response.body = body
         del response.headers["Content-Length"]

@@ -19,6 +19,7 @@ from websockets.exceptions import ConnectionClosed
 from actuated_characters.viewer.web.connection import CheckedConnection, Reject
 from actuated_characters.viewer.web.gate import ServerGate
 from actuated_characters.viewer.web.message_check import MessageCheck
+from actuated_characters.viewer.web.page_parts import PageParts
 from actuated_characters.viewer.web.request_check import RequestCheck, is_loopback
 from msgs_config.errors import ConfigurationError, RecordingError
 
@@ -30,6 +31,9 @@ _PATIENCE = 10.0  # s for a page to respond to a ping
 
 class ViewerServer(viser.ViserServer):
     """viser's server, which nothing makes public."""
+
+    parts: PageParts
+    """What its page has beside viser's own."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Do nothing: viser would let others in through a server of its makers'."""
@@ -101,7 +105,8 @@ def start_server(listening: socket.socket, check: RequestCheck, reject: Reject) 
     Raises:
         ConfigurationError: the installed viser starts its server in a way that cannot be checked.
     """
-    gate = ServerGate(check, reject)
+    parts = PageParts()
+    gate = ServerGate(check, reject, parts)
     unchecked = ConfigurationError(
         f"viser {viser.__version__} starts its server in a way in which requests cannot be "
         "checked; install viser 1.1"
@@ -113,6 +118,7 @@ def start_server(listening: socket.socket, check: RequestCheck, reject: Reject) 
     if not used:
         server.stop()
         raise unchecked
+    server.parts = parts
     server._event_loop.set_exception_handler(gate.handle_error)
     gate.open(MessageCheck(server))
     return server

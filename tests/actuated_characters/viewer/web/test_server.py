@@ -1,6 +1,7 @@
 """The viewer's server as other programs and pages meet it: by a plain client of websockets."""
 
 import http.client
+import json
 import socket
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -104,6 +105,26 @@ def test_the_page_is_served_and_none_may_frame_it(running: Running) -> None:
     assert page.status == HTTPStatus.OK
     assert page.getheader("X-Frame-Options") == "DENY"
     assert b"<html" in page.read()
+
+
+def test_parts_of_our_own_are_served_with_the_page_and_to_no_page_from_elsewhere(
+    running: Running, tmp_path: Path
+) -> None:
+    script = tmp_path / "hello.js"
+    script.write_text("const hello = 'grüß dich';", encoding="utf-8")
+    running.server.parts.files.append(script)
+    running.server.parts.texts["/marks.json"] = lambda: '{"marks": []}'
+    host = f"localhost:{running.port}"
+
+    marks = running.get("/marks.json?again", host)
+    assert marks.status == HTTPStatus.OK
+    assert marks.getheader("Content-Type") == "application/json"
+    assert marks.getheader("Cross-Origin-Resource-Policy") == "same-origin"
+    assert json.loads(marks.read()) == {"marks": []}
+    assert running.get("/marks.json", host, "http://evil.example").status == HTTPStatus.FORBIDDEN
+    page = running.get("/", host).read()
+    head = page.index(b"<head>"), page.index(b"</head>")
+    assert head[0] < page.index("grüß dich".encode()) < head[1]
 
 
 @pytest.mark.parametrize("path", ["/", "/missing", "/?websocket=ws://evil.example"])

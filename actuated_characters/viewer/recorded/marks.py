@@ -1,0 +1,79 @@
+"""What is marked on the time line of a recorded run: when something has happened in it."""
+
+from dataclasses import dataclass
+
+from actuated_characters.bags.keyframes import find_keyframes
+from actuated_characters.bags.recording import Recording, find_bag
+from actuated_characters.metrics.recording_metrics import fall_time
+from actuated_characters.report.charts import mode_colors
+from actuated_characters.report.events import MODE, PUSH, RESET, THROW, find_events
+from actuated_characters.viewer.recorded.hits import find_hits
+from actuated_characters.viewer.recorded.run import RecordedRun
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+
+HIT, KEYFRAME, END = "hit", "keyframe", "end"
+"""Kinds of marks beside those of events."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Something on the time line."""
+
+    kind: str  # of an event, or HIT, KEYFRAME or END
+    start: float  # s since the first state
+    end: float  # s; the start, where it is a moment
+    text: str
+    label: str = ""  # what stands on a span
+    color: str = ""  # of a mode, as a page has it
+
+
+def find_marks(run: RecordedRun) -> list[Mark]:
+    """All marks of a run, by their start.
+
+    Raises:
+        ActuatedCharactersError: its bag cannot be read.
+    """
+    several = len(run.recordings) > 1
+    marks = [
+        mark
+        for number, recording in enumerate(run.recordings)
+        for mark in _marks_of(recording, several=several, first=number == 0)
+    ]
+    last = float(run.times[-1])
+    marks += [*_keyframes(run), Mark(END, last, last, "the last state")]
+    return sorted(marks, key=lambda mark: mark.start)
+
+
+def _marks_of(recording: Recording, *, several: bool, first: bool) -> list[Mark]:
+    """Events of one character of `several`, and hits; the world's belong to the first one."""
+    events = find_events(recording, fall_time(recording) if recording.parameters else None)
+    colors = mode_colors(events)
+    name = f"{recording.name}: " if several else ""
+    marks = [
+        Mark(
+            each.kind,
+            each.start,
+            each.start + (each.duration if each.kind in (MODE, PUSH) else 0.0),
+            name + each.text,
+            each.label,
+            colors[each.label] if each.kind == MODE else "",
+        )
+        for each in events
+        if first or each.kind not in (THROW, RESET)
+    ]
+    return marks + [
+        Mark(HIT, hit.time, hit.time, f"{name}{hit.ball} hits {hit.link}: {hit.impulse:.3g} N s")
+        for hit in find_hits(recording)
+    ]
+
+
+def _keyframes(run: RecordedRun) -> list[Mark]:
+    """Where a fork can begin, if that is not at the first state alone."""
+    found = find_keyframes(find_bag(run.path))
+    first_ns, last_ns = (int(run.recordings[0].stamps_ns[row]) for row in (0, -1))
+    stamps = [place.stamp_ns for place in (found.places if found is not None else ())]
+    within = [stamp_ns for stamp_ns in stamps if first_ns <= stamp_ns <= last_ns]
+    times = [(stamp_ns - first_ns) / NANOSECONDS_PER_SECOND for stamp_ns in within]
+    if len(times) < 2:
+        return []
+    return [Mark(KEYFRAME, time, time, "keyframe: a fork begins here") for time in times]

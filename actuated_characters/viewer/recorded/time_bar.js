@@ -1,0 +1,162 @@
+// The time line at the bottom of a recorded run's page; time_bar.py says how it is connected.
+(() => {
+  const FRAME = "/time_line", ADDRESS = "/time_line.json";
+  const NEAR = 5; // pixels between the pointer and a mark that it means
+  const SEND_PERIOD = 40; // ms between two times that are sent during a drag
+  const LEAP = 0.1; // s that an arrow key goes with Shift
+  const BEYOND = 1e-7; // s: no rounded time, which the panel's slider would not be told of again
+  const NOT_OURS = "input, textarea, select, [contenteditable], [role=slider], [role=dialog]";
+  let told = null, asked = -1, time = 0, plays = false, drags = false, sentAt = 0, spoken = "";
+  const make = (tag, name, parent) => {
+    const made = document.createElement(tag);
+    made.className = name;
+    parent?.append(made);
+    return made;
+  };
+  const bar = make("section", "", null);
+  bar.id = "time-line";
+  bar.hidden = true;
+  bar.setAttribute("aria-label", "Time line");
+  const play = make("button", "play", bar), shown = make("div", "time", bar);
+  const track = make("div", "track", bar), rail = make("div", "rail", track);
+  const now = make("div", "now", track), tip = make("div", "tip", track);
+  Object.entries({ role: "slider", tabindex: 0, "aria-label": "Time in seconds" }).forEach(
+    ([name, value]) => rail.setAttribute(name, value));
+  tip.style.display = "none";
+
+  const update = (uuid, value) => window.__viserMutable.sendMessage(
+    { type: "GuiUpdateMessage", uuid, updates: { value } });
+  const press = button => update(told.playback, button);
+  const seek = to => to >= told.last ? press("End") : to <= told.first ? press("Start")
+    : update(told.slider, Math.min(to + BEYOND, told.last));
+  const share = at => (at - told.first) / Math.max(told.last - told.first, 1e-9);
+  const percent = at => `${100 * Math.min(Math.max(share(at), 0), 1)}%`;
+
+  function draw(mark, ghost) {
+    const isMode = mark.kind === "mode";
+    const made = make(isMode ? "div" : "button", `${isMode ? "" : "mark "}${mark.kind}`, track);
+    made.style.left = percent(mark.start);
+    if (mark.end > mark.start) made.style.width = `calc(${percent(mark.end)} - ${percent(mark.start)})`;
+    if (isMode) made.style.background = mark.color;
+    if (ghost) made.classList.add("ghost");
+    made.textContent = mark.label;
+    made.dataset.made = "";
+    if (!isMode) {
+      made.setAttribute("aria-label", `${mark.start.toFixed(2)} s: ${ghost}${mark.text}`);
+      made.onclick = event => { if (event.detail === 0) seek(mark.start); }; // by the keyboard
+    }
+  }
+
+  async function fetchMarks(version) {
+    asked = version;
+    told = await (await fetch(ADDRESS)).json().catch(() => null);
+    if (!told?.slider) { told = null; asked = -1; return; }
+    track.querySelectorAll("[data-made]").forEach(each => each.remove());
+    const ghost = told.ghost && `${told.ghost}: `;
+    told.ghostMarks = told.ghostMarks.filter(each => each.kind !== "keyframe" && each.kind !== "end");
+    const all = [...told.marks.map(each => [each, ""]), ...told.ghostMarks.map(each => [each, ghost])];
+    for (const wanted of [true, false])
+      all.filter(([each]) => (each.kind === "mode") === wanted).forEach(each => draw(...each));
+    track.classList.toggle("two", told.ghostMarks.length > 0);
+    rail.setAttribute("aria-valuemin", told.first);
+    rail.setAttribute("aria-valuemax", told.last);
+    track.append(now, tip);
+    bar.hidden = false;
+  }
+
+  const timeOf = event => {
+    const box = track.getBoundingClientRect();
+    const part = Math.min(Math.max((event.clientX - box.x) / box.width, 0), 1);
+    return told.first + part * (told.last - told.first);
+  };
+  const marksNear = at => {
+    const near = NEAR * (told.last - told.first) / track.clientWidth;
+    const named = each => ({ ...each, text: `${told.ghost}: ${each.text}` });
+    return [...told.marks, ...told.ghostMarks.map(named)].filter(
+      ({ kind, start, end }) => kind === "mode" ? start <= at && at < end
+        : start - near <= at && at <= end + near);
+  };
+  track.onpointerdown = event => {
+    track.setPointerCapture(event.pointerId);
+    drags = true;
+    const at = timeOf(event);
+    const moments = marksNear(at).filter(({ kind }) => kind !== "mode");
+    moments.sort((one, other) => Math.abs(one.start - at) - Math.abs(other.start - at));
+    seek(moments.length ? moments[0].start : at);
+    document.activeElement?.blur(); // or a field of the panel would keep the keys
+    event.preventDefault();
+  };
+  track.onpointermove = event => {
+    const at = timeOf(event), texts = marksNear(at).map(({ text }) => text);
+    tip.style.display = "block";
+    tip.style.left = percent(at);
+    tip.textContent = [`${at.toFixed(2)} s`, ...texts].join("\n");
+    const over = tip.getBoundingClientRect();
+    const aside = Math.max(4 - over.left, 0) + Math.min(innerWidth - 4 - over.right, 0);
+    tip.style.left = `calc(${percent(at)} + ${aside}px)`;
+    if (drags && performance.now() - sentAt > SEND_PERIOD) {
+      sentAt = performance.now();
+      seek(at);
+    }
+  };
+  track.onpointerup = event => { if (drags && sentAt) seek(timeOf(event)); drags = false; sentAt = 0; };
+  track.onpointercancel = () => { drags = false; };
+  track.onpointerleave = () => { tip.style.display = "none"; };
+  play.onclick = () => press(plays ? "Pause" : "Play");
+
+  const KEYS = {
+    " ": () => press(plays ? "Pause" : "Play"),
+    ArrowLeft: leaps => leaps ? seek(time - LEAP) : press("-1"),
+    ArrowRight: leaps => leaps ? seek(time + LEAP) : press("+1"),
+    Home: () => press("Start"),
+    End: () => press("End"),
+  };
+  addEventListener("keydown", event => {
+    const act = KEYS[event.key], at = event.target;
+    if (!act || !told || event.ctrlKey || event.metaKey || event.altKey) return;
+    // A control that the keyboard has come to keeps its keys; a button that was clicked does not.
+    const isOurs = bar.contains(at);
+    if (!isOurs && at.closest?.(`${NOT_OURS}, button:focus-visible`)) return;
+    event.preventDefault();
+    event.stopPropagation(); // or viser would turn the camera by the arrow keys
+    act(event.shiftKey);
+  }, true);
+  addEventListener("keyup", event => { // on which a button would be pressed by space
+    if (event.key === " " && bar.contains(event.target)) event.preventDefault();
+  }, true);
+
+  // Beside the panel where it reaches down to the bar, else as wide as the page.
+  function place() {
+    let panel = told && document.getElementById(told.slider), edge = innerWidth;
+    for (; panel && panel !== document.body; panel = panel.parentElement)
+      if (["absolute", "fixed"].includes(getComputedStyle(panel).position)) {
+        const box = panel.getBoundingClientRect();
+        const isBeside = box.width < 0.5 * innerWidth && box.left > 0.4 * innerWidth;
+        if (isBeside && box.bottom > bar.getBoundingClientRect().top) edge = Math.min(edge, box.left);
+      }
+    bar.style.width = `${edge - 24}px`;
+  }
+  function show() {
+    requestAnimationFrame(show);
+    const at = window.__viserMutable?.nodePoseData?.[FRAME]?.position;
+    if (!at) return;
+    if (at[2] && at[2] !== asked) fetchMarks(at[2]);
+    if (!told) return;
+    [time, plays] = [at[0], at[1] > 0.5];
+    const line = `${time.toFixed(3)} / ${told.last.toFixed(2)} s`;
+    if (line + plays === spoken) return;
+    spoken = line + plays;
+    shown.textContent = line;
+    now.style.left = percent(time);
+    play.textContent = plays ? "❚❚" : "▶";
+    play.setAttribute("aria-label", plays ? "Pause" : "Play");
+    const mode = told.marks.find(({ kind, start, end }) => kind === "mode" && start <= time && time < end);
+    rail.setAttribute("aria-valuenow", time.toFixed(3));
+    rail.setAttribute("aria-valuetext", `${time.toFixed(3)} s${mode ? `, ${mode.label}` : ""}`);
+  }
+  addEventListener("DOMContentLoaded", () => {
+    document.body.append(bar);
+    setInterval(place, 250);
+    show();
+  });
+})();

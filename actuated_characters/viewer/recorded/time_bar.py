@@ -1,0 +1,54 @@
+"""The time line at the bottom of a recorded run's page.
+
+viser's panels stand at the sides, and none of them is as wide as a page of any width. So the page
+has a script of its own (`time_bar.js`), which draws the time line and listens to clicks and keys.
+It needs no connection of its own: what it asks for it sends as if the panel's own slider or buttons
+had been used, which are checked like those; the present time comes along with the scene's poses, in
+a frame that nobody sees; and the marks, which seldom change, are a text that it fetches.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from actuated_characters.viewer.recorded.marks import Mark
+from actuated_characters.viewer.recorded.timeline import Playback
+from actuated_characters.viewer.web.server import ViewerServer
+
+_FRAME, _ADDRESS = "/time_line", "/time_line.json"
+_FILES = [Path(__file__).with_name(name) for name in ("time_bar.js", "time_bar.css")]
+
+
+class TimeBar:
+    """The time line of all pages of a server."""
+
+    def __init__(
+        self, server: ViewerServer, timeline: Playback, slider: Any, playback: Any
+    ) -> None:
+        """Add it; the panel's `slider` sets the time, and `playback` has its buttons."""
+        self._timeline = timeline
+        self._version = 0
+        self._frame = server.scene.add_frame(_FRAME, show_axes=False)
+        self._told: dict[str, Any] = {
+            "first": float(timeline.times[0]),
+            "last": timeline.end,
+            "slider": slider._impl.uuid,
+            "playback": playback._impl.uuid,
+        }
+        self._text = "{}"
+        server.parts.files += _FILES
+        server.parts.texts[_ADDRESS] = lambda: self._text
+
+    def mark(self, marks: Sequence[Mark], ghost: str = "", of_ghost: Sequence[Mark] = ()) -> None:
+        """Show these marks, and below them those of a ghost, if it has a name."""
+        self._version += 1
+        shown = {"marks": marks, "ghostMarks": of_ghost}
+        lists = {name: [asdict(mark) for mark in each] for name, each in shown.items()}
+        self._text = json.dumps({**self._told, **lists, "ghost": ghost, "version": self._version})
+
+    def show_time(self) -> None:
+        """Bring all pages to the present time."""
+        timeline = self._timeline
+        self._frame.position = (timeline.time, float(timeline.plays), float(self._version))

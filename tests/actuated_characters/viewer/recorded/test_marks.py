@@ -1,0 +1,91 @@
+"""The marks of a recorded run's time line: when what happened, by other ways of knowing it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuated_characters.bags.recording import read_recording
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
+from actuated_characters.runs.planned.throws import PlannedThrow
+from actuated_characters.runs.planned.wrenches import parse_push
+from actuated_characters.viewer.recorded.hits import find_hits
+from actuated_characters.viewer.recorded.marks import Mark, find_marks
+from actuated_characters.viewer.recorded.run import read_run
+from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.throw import ProjectileThrow
+from tests.support.runs import run_plan_here
+
+STEP_NS = NANOSECONDS_PER_SECOND // 240
+AT = 96  # the tick in which the balls begin, so that their first states are of 0.4 s
+# One strikes the trunk hard after a metre; one falls on the ground, and rolls away from the body.
+HITS = ProjectileThrow(6.0, 0.1, (-1.0, 0.0, 1.1), (10.0, 0.0, 0.0))
+ROLLS = ProjectileThrow(3.0, 0.1, (0.0, 2.0, 0.3), (0.0, 1.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def stands(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A humanoid that stands, is pushed at 0.2 s, and has a ball thrown at it at 0.4 s."""
+    directory = tmp_path_factory.mktemp("runs") / "stands"
+    simulator = {"wrench_duration": 0.1, "keyframe_period": 0.25}
+    controller = {"root_assistance": True, "keyframe_period": 0.25, "behaviour": "active_ragdoll"}
+    plan = make_plan("humanoid", 1.0, {"reference": "hold"}, simulator, controller)
+    throws = [PlannedThrow((AT + 1) * STEP_NS, each) for each in (HITS, ROLLS)]
+    pushes = [parse_push("root:0,60,0@0.2", plan)]
+    run_plan_here(plan, directory, pushes=pushes, throws=throws)
+    return directory
+
+
+def of_kind(marks: list[Mark], kind: str) -> list[Mark]:
+    return [mark for mark in marks if mark.kind == kind]
+
+
+def test_marks_say_when_something_happened(stands: Path) -> None:
+    marks = find_marks(read_run(stands))
+
+    (push,) = of_kind(marks, "push")
+    assert (push.start, push.end) == pytest.approx((0.2, 0.3))
+    assert push.text == "push on root for 0.1 s: up to 60 N, 6 N s"
+    assert [mark.start for mark in of_kind(marks, "throw")] == pytest.approx([0.4, 0.4], abs=0.005)
+    keyframes = [mark.start for mark in of_kind(marks, "keyframe")]
+    assert keyframes == pytest.approx([0.5, 0.75, 1.0])  # there is none while a push acts
+    (end,) = of_kind(marks, "end")
+    assert end.start == pytest.approx(1.0)
+    assert [mark.start for mark in marks] == sorted(mark.start for mark in marks)
+
+
+def test_modes_follow_one_another_without_a_gap(stands: Path) -> None:
+    modes = of_kind(find_marks(read_run(stands)), "mode")
+
+    assert [mode.label for mode in modes[:2]] == ["TRACK", "LIMP"]
+    assert (modes[0].start, modes[-1].end) == (0.0, pytest.approx(1.0))
+    starts, ends = np.array([(mode.start, mode.end) for mode in modes]).T
+    np.testing.assert_allclose(starts[1:], ends[:-1])
+    assert all(mode.color.startswith("#") and len(mode.color) == 7 for mode in modes)
+
+
+def test_a_ball_hits_when_simulating_it_without_the_character_says_so(stands: Path) -> None:
+    recording = read_recording(stands)
+    plan = make_plan("humanoid", 1.0, {"reference": "hold"}, {}, {})
+    throws = [
+        PlannedThrow(int(recording.stamps_ns[tick]), throw)
+        for tick, each in enumerate(recording.throws)
+        for throw in each
+    ]
+
+    words = describe_hits(plan, throws, read_states(stands))
+
+    hits = find_hits(recording)
+    assert {each.ball for each in hits} == {"ball_1"}
+    hit = hits[0]
+    assert words == [f"hit '{hit.link}' at {hit.time:.3f} s", "missed"]
+    # it loses its speed, and at most comes back with it
+    assert 0.3 * 60.0 < hit.impulse < 2.0 * 60.0
+
+
+def test_one_keyframe_is_no_place_to_choose(tmp_path: Path) -> None:
+    plan = make_plan("pendulum", 0.2, {"reference": "hold"}, {"keyframe_period": 0.15}, {})
+    run_plan_here(plan, tmp_path / "short")
+
+    assert not of_kind(find_marks(read_run(tmp_path / "short")), "keyframe")
