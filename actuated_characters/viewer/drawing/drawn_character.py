@@ -28,7 +28,6 @@ from msgs_config.messages.wrenches import WrenchArrays
 
 _STRAIN_COLOR = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
 _LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
-_GHOST = (64, 190, 110)
 _GHOST_OPACITY = 0.3  # where it has no skin, which is seen as an outline
 _CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
 _METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
@@ -36,6 +35,9 @@ _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
 _MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least
 _ABOVE_GROUND = 0.004  # m, height of what is drawn on the ground
 _GRAVITY = 9.81
+
+GHOST = (64, 190, 110)
+"""Colour of the reference, or of another run beside it."""
 
 LinkMesh = viser.MeshHandle | viser.MeshSkinnedHandle
 
@@ -120,7 +122,7 @@ class DrawnCharacter:
         own = list(255.0 * colors)
         rgb = [_rgb(color) for color in own]
         self._skin = DrawnSkin(self._scene, links, self.character, skin, rgb)
-        self._ghost_skin = GhostSkin(self._scene, f"{self.name}/ghost_skin", skin, _GHOST)
+        self._ghost_skin = GhostSkin(self._scene, f"{self.name}/ghost_skin", skin, GHOST)
         for row, color in enumerate(own):
             if (mesh := self._skin.handle(row)) is not None:
                 self._meshes[row].append(mesh)
@@ -166,7 +168,7 @@ class DrawnCharacter:
     def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
         vertices, _, faces = surface_of(shape)
         red, green, blue, alpha = shape.color_rgba
-        color = _GHOST if ghost else _rgb(255.0 * np.array((red, green, blue)))
+        color = GHOST if ghost else _rgb(255.0 * np.array((red, green, blue)))
         opacity = _GHOST_OPACITY if ghost else (None if alpha >= 1.0 else max(alpha, 0.1))
         return self._scene.add_mesh_simple(
             name,

@@ -1,6 +1,6 @@
 """What is marked on the time line of a recorded run: when something has happened in it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from actuated_characters.bags.keyframes import find_keyframes
 from actuated_characters.bags.recording import Recording, find_bag
@@ -28,7 +28,7 @@ class Mark:
 
 
 def find_marks(run: RecordedRun) -> list[Mark]:
-    """All marks of a run, by their start.
+    """All marks of a run, by their start, in the time of the run that it is beside.
 
     Raises:
         ActuatedCharactersError: its bag cannot be read.
@@ -41,7 +41,9 @@ def find_marks(run: RecordedRun) -> list[Mark]:
     ]
     last = float(run.times[-1])
     marks += [*_keyframes(run), Mark(END, last, last, "the last state")]
-    return sorted(marks, key=lambda mark: mark.start)
+    marks.sort(key=lambda mark: mark.start)
+    since = run.starts
+    return [replace(mark, start=mark.start + since, end=mark.end + since) for mark in marks]
 
 
 def _marks_of(recording: Recording, *, several: bool, first: bool) -> list[Mark]:

@@ -1,7 +1,7 @@
 """Shows a recorded run in a browser: no node, for nothing of it is on topics."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import viser
@@ -19,14 +19,14 @@ from actuated_characters.viewer.recorded.export import (
     save_picture,
 )
 from actuated_characters.viewer.recorded.forking import Fork
+from actuated_characters.viewer.recorded.ghosts import Ghosts
 from actuated_characters.viewer.recorded.marks import find_marks
-from actuated_characters.viewer.recorded.plots import Plots, curves
-from actuated_characters.viewer.recorded.run import RecordedRun, check_comparable, read_run
+from actuated_characters.viewer.recorded.plots import Plots, run_curves
+from actuated_characters.viewer.recorded.run import RecordedRun, read_run
 from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import Playback, frame_times
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.server import ViewerServer
-from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError
 
 _LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
@@ -48,7 +48,9 @@ class RecordedPlayer:
             ActuatedCharactersError: a mesh or `skin` cannot be used, or a bag cannot be read again.
         """
         self._server, self._run = server, run
-        self._ghosts = {_name(other, run): other for other in others}
+        self._ghosts = Ghosts(run)
+        for other in others:
+            self._ghosts.add(other)
         self._timeline = Playback(run.times)
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
@@ -65,18 +67,15 @@ class RecordedPlayer:
         ]
         self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
         self._panel = RecordedPanel(server.gui, self._scene, self._timeline, self._actions, self)
-        self._panel.choose_ghosts(list(self._ghosts), next(iter(self._ghosts), REFERENCE))
+        names = self._ghosts.names
+        self._panel.choose_ghosts(names, names[0] if names else REFERENCE)
         panel = self._panel
         self._bar = TimeBar(server, self._timeline, panel.slider, panel.playback)
         self._marks = find_marks(run)
-        self._marked: str | None = None  # the ghost whose marks are shown
-        self._plots = Plots(server.gui)
-        self._curves: Mapping[str, Mapping[str, FloatArray]] = {
-            each.name or each.character.name: curves(each) for each in run.recordings
-        }
+        self._plots, self._curves = Plots(server.gui), run_curves(run, run.name)
         self._panel.character.options = tuple(self._curves)
         self._panel.character.visible = len(self._curves) > 1
-        self._plotted = ""
+        self._compared: tuple[str, str] | None = None  # the ghost and the character of the plots
         self._fork: Fork | None = None
         self._timeline.play()
         self._draw(0.0)
@@ -109,7 +108,7 @@ class RecordedPlayer:
             for number, drawn in enumerate(self._drawn):
                 sample = self._run.sample(number, row)
                 if other is not None:
-                    sample.reference = other.position_at(number, now)
+                    sample.reference = other.run.position_at(number, now)
                 elif chosen != REFERENCE:
                     sample.reference = None
                 drawn.shows = self._panel.shows
@@ -121,24 +120,22 @@ class RecordedPlayer:
                 self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)
             self._radii = radii
             self._scene.follow_characters(self._drawn, seconds)
-            self._mark(chosen)
             self._bar.show_time()
         self._panel.show_time(self._run.name)
-        plotted = str(self._panel.character.value)
-        if plotted != self._plotted and plotted in self._curves:
-            self._plotted = plotted
-            self._plots.choose(self._run.times, self._curves[plotted])
+        self._compare(chosen, str(self._panel.character.value))
         self._plots.point_at(now)
 
-    def _mark(self, chosen: str) -> None:
-        """Have the time line show the marks of the run, and of the chosen ghost if it is a run."""
-        if chosen == self._marked:
+    def _compare(self, chosen: str, character: str) -> None:
+        """Show the marks and curves of the run, and those of the chosen ghost if it is a run."""
+        if (chosen, character) == self._compared or character not in self._curves:
             return
-        self._marked, other = chosen, self._ghosts.get(chosen)
-        if other is None:
+        self._compared, ghost = (chosen, character), self._ghosts.get(chosen)
+        if ghost is None:
             self._bar.mark(self._marks)
+            self._plots.choose(self._curves[character])
         else:
-            self._bar.mark(self._marks, chosen, find_marks(other))
+            self._bar.mark(self._marks, ghost.name, ghost.marks)
+            self._plots.choose(self._curves[character], ghost.curves.get(character))
 
     def save_picture(self, client: viser.ClientHandle) -> None:
         """Save what a client sees beside the run."""
@@ -210,10 +207,8 @@ class RecordedPlayer:
         reason = fork.error
         try:
             if not reason:
-                other = read_run(fork.directory)
-                check_comparable(self._run, other)
-                self._ghosts[_name(other, self._run)] = other
-                self._panel.choose_ghosts(list(self._ghosts), _name(other, self._run))
+                ghost = self._ghosts.add(read_run(fork.directory))
+                self._panel.choose_ghosts(self._ghosts.names, ghost.name)
         except ActuatedCharactersError as error:
             reason = f"error: {error}"
         fork.cancel()
@@ -223,8 +218,3 @@ class RecordedPlayer:
         """Say something in the panel and in the terminal."""
         self._panel.tell(sentence)
         print(sentence, flush=True)
-
-
-def _name(other: RecordedRun, run: RecordedRun) -> str:
-    """What another run is called beside a run."""
-    return other.name if other.name != run.name else str(other.path)

@@ -1,6 +1,6 @@
 """A recorded run as the viewer shows it, state by state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ class RecordedRun:
 
     path: Path
     scene: RecordedScene
+    starts: float = 0.0  # s, when its first state is in the time of the run that it is beside
 
     @property
     def name(self) -> str:
@@ -59,9 +60,15 @@ class RecordedRun:
             pushes,
         )
 
-    def position_at(self, character: int, time: float) -> FloatArray:
-        """Where a character was at a time in s, (n,), message form."""
-        position: FloatArray = self.recordings[character].position[row_at(self.times, time)]
+    def position_at(self, character: int, time: float) -> FloatArray | None:
+        """Where a character was at a time in s, (n,), message form; None before the first state.
+
+        The time is that of the run that this one is beside.
+        """
+        if time < self.starts:
+            return None
+        row = row_at(self.times, time - self.starts)
+        position: FloatArray = self.recordings[character].position[row]
         return position
 
     def balls(self, row: int) -> tuple[BallStates | None, list[float]]:
@@ -79,6 +86,24 @@ def read_run(path: Path, source: RobotSource | None = None) -> RecordedRun:
         RecordingError: there is no recording of a world, or none that can be read.
     """
     return RecordedRun(path, make_scene(read_any(path, source or RobotSource())))
+
+
+def beside(run: RecordedRun, other: RecordedRun) -> RecordedRun:
+    """Another run at the time of a run, both from their first states on.
+
+    A fork is at the time of the run that it is of, also where it is recorded from a keyframe on.
+
+    Raises:
+        RecordingError: they have not the same characters.
+    """
+    check_comparable(run, other)
+    stamps_ns, first_ns = run.recordings[0].stamps_ns, int(other.recordings[0].stamps_ns[0])
+    row = min(int(np.searchsorted(stamps_ns, first_ns)), len(stamps_ns) - 1)
+    is_same = stamps_ns[row] == first_ns and all(
+        np.array_equal(ours.position[row], theirs.position[0])
+        for ours, theirs in zip(run.recordings, other.recordings, strict=True)
+    )
+    return replace(other, starts=float(run.times[row]) if is_same else 0.0)
 
 
 def check_comparable(run: RecordedRun, other: RecordedRun) -> None:

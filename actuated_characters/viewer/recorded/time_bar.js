@@ -53,7 +53,8 @@
     if (!told?.slider) { told = null; asked = -1; return; }
     track.querySelectorAll("[data-made]").forEach(each => each.remove());
     const ghost = told.ghost && `${told.ghost}: `;
-    told.ghostMarks = told.ghostMarks.filter(each => each.kind !== "keyframe" && each.kind !== "end");
+    told.ghostMarks = told.ghostMarks.filter(({ kind, start }) => start <= told.last
+      && kind !== "keyframe" && kind !== "end");
     const all = [...told.marks.map(each => [each, ""]), ...told.ghostMarks.map(each => [each, ghost])];
     for (const wanted of [true, false])
       all.filter(([each]) => (each.kind === "mode") === wanted).forEach(each => draw(...each));
@@ -91,8 +92,8 @@
     tip.style.display = "block";
     tip.style.left = percent(at);
     tip.textContent = [`${at.toFixed(2)} s`, ...texts].join("\n");
-    const over = tip.getBoundingClientRect();
-    const aside = Math.max(4 - over.left, 0) + Math.min(innerWidth - 4 - over.right, 0);
+    const over = tip.getBoundingClientRect(), most = bar.getBoundingClientRect();
+    const aside = Math.max(most.left - over.left, 0) + Math.min(most.right - over.right, 0);
     tip.style.left = `calc(${percent(at)} + ${aside}px)`;
     if (drags && performance.now() - sentAt > SEND_PERIOD) {
       sentAt = performance.now();

@@ -1,5 +1,6 @@
 """A recorded run as the viewer shows it: each state with what led to it, and plots by theory."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,9 @@ import pytest
 
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
-from actuated_characters.viewer.recorded.plots import curves
-from actuated_characters.viewer.recorded.run import check_comparable, read_run
+from actuated_characters.render.scene import make_scene
+from actuated_characters.viewer.recorded.plots import curves, resampled, run_curves
+from actuated_characters.viewer.recorded.run import RecordedRun, beside, check_comparable, read_run
 from msgs_config.errors import RecordingError
 from tests.support.bags import Made, make_run, write_bag
 
@@ -44,8 +46,46 @@ def test_a_sample_is_a_state_with_the_effort_that_led_to_it(walk: Made, director
 def test_another_run_is_where_it_was_at_that_time(walk: Made, directory: Path) -> None:
     run = read_run(directory)
 
-    assert run.position_at(0, 0.25).tolist() == walk.states[60].position.tolist()
-    assert run.position_at(0, 99.0).tolist() == walk.states[-1].position.tolist()
+    for time, row in ((0.25, 60), (99.0, -1)):
+        position = run.position_at(0, time)
+        assert position is not None
+        assert position.tolist() == walk.states[row].position.tolist()
+
+
+def test_a_fork_that_begins_with_a_keyframe_is_at_the_time_of_its_original(directory: Path) -> None:
+    run = read_run(directory)
+    later = RecordedRun(directory, make_scene([run.recordings[0].rows(slice(48, 121))]))
+
+    ghost = beside(run, later)
+
+    assert ghost.starts == pytest.approx(0.2)
+    assert ghost.position_at(0, 0.1) is None
+    for time in (0.2, 0.3, 0.5):
+        ours, theirs = run.position_at(0, time), ghost.position_at(0, time)
+        assert ours is not None and theirs is not None
+        assert ours.tolist() == theirs.tolist()
+    (character,) = run_curves(ghost, "fork").values()
+    (original,) = run_curves(run, "run").values()
+    at = np.searchsorted(original.times, character.times + 1e-9) - 1
+    for name, values in character.values.items():
+        np.testing.assert_array_equal(values[1:], original.values[name][at][1:])
+
+
+def test_another_run_that_begins_elsewhere_begins_together_with_the_run(directory: Path) -> None:
+    run = read_run(directory)
+    part = run.recordings[0].rows(slice(48, 121))
+    moved = replace(part, position=part.position + 1e-6)
+
+    assert beside(run, RecordedRun(directory, make_scene([moved]))).starts == 0.0
+
+
+def test_the_ghosts_curve_has_the_largest_value_of_each_part_of_the_time() -> None:
+    times, values = np.arange(10) / 10.0, np.array([0, 3, 1, 2, 9, 4, np.nan, 7, 8, 5], dtype=float)
+
+    found = resampled(times + 0.2, values, np.array([0.0, 0.2, 0.5, 0.9]), 1.0)
+
+    # 0.2 to 0.4 s, 0.5 to 0.8 s, and 0.9 s to the end, which is before the two last values
+    np.testing.assert_array_equal(found, [np.nan, 3.0, 9.0, 8.0])
 
 
 def test_runs_of_other_characters_cannot_be_compared(directory: Path, tmp_path: Path) -> None:
