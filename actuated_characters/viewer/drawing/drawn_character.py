@@ -45,7 +45,7 @@ Bind = Callable[[LinkMesh, int], None]
 """Makes a shape of a link, by its number, one that can be touched."""
 
 
-def _bind_nothing(mesh: LinkMesh, row: int) -> None:
+def bind_nothing(mesh: LinkMesh, row: int) -> None:
     """Leave a shape as one that cannot be touched."""
 
 
@@ -58,7 +58,7 @@ class DrawnCharacter:
         name: str,
         character: Character,
         effort_limits: FloatArray,
-        bind: Bind = _bind_nothing,
+        bind: Bind = bind_nothing,
         number: int = 0,
         skin: GivenSkin | None = None,
     ) -> None:

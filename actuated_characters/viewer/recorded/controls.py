@@ -10,16 +10,17 @@ from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from actuated_characters.viewer.parameters import SHOWN
+from actuated_characters.viewer.recorded.fork_controls import CANCEL, ForkControls, ForkTarget
 from actuated_characters.viewer.recorded.timeline import Playback
 
 NO_GHOST, REFERENCE = "none", "reference"
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _PLAY, _PAUSE, _BACK, _NEXT, _START, _END = "Play", "Pause", "-1", "+1", "Start", "End"
-_PNG, _MP4, _CANCEL = "PNG", "MP4", "Cancel"
+_PNG, _MP4 = "PNG", "MP4"
 _OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
 
 
-class PanelTarget(Protocol):
+class PanelTarget(ForkTarget, Protocol):
     """What the panel acts on; its methods are called in the player's own thread."""
 
     def save_picture(self, client: viser.ClientHandle) -> None:
@@ -27,9 +28,6 @@ class PanelTarget(Protocol):
 
     def save_film(self, client: viser.ClientHandle, start: float, end: float) -> None:
         """Save what a client sees from one time to another, s."""
-
-    def fork(self, push: str, settings: Sequence[str]) -> None:
-        """Fork the run at the present time."""
 
     def cancel(self) -> None:
         """End the film or the fork that is being made."""
@@ -45,7 +43,10 @@ class RecordedPanel:
         timeline: Playback,
         actions: ActionQueue,
         shown: PanelTarget,
+        *,
+        by_arrow: bool,
     ) -> None:
+        """`by_arrow`: arrows can be drawn on the body, for forks."""
         self._gui, self._scene, self._timeline = gui, scene, timeline
         self._actions, self._shown = actions, shown
         self.shows = {**dict.fromkeys(SHOWN, True), "reference": True}
@@ -55,12 +56,13 @@ class RecordedPanel:
         self._state = gui.add_markdown("")
         self._add_time()
         self.ghost: Any = gui.add_dropdown("Ghost", (REFERENCE, NO_GHOST))
+        self.forks = ForkControls(gui, actions, shown, self._cancel)
         self.character: Any = gui.add_dropdown("Plots of", ("",), visible=False)
         self._told = gui.add_markdown("", visible=False)
         self._progress: Any = gui.add_progress_bar(0.0, visible=False)
         self._add_shown()
         self._add_export()
-        self._add_fork()
+        self.forks.add_folder(by_arrow=by_arrow)
 
     def _on(self, handle: Any, act: Callable[[Any], None], *, click: bool = False) -> None:
         """Have the player's thread call a function with a control's value when a client sets it."""
@@ -115,7 +117,7 @@ class RecordedPanel:
         with gui.add_folder("Export", expand_by_default=False):
             start = gui.add_number("From (s)", float(timeline.times[0]), min=0.0, step=0.1)
             end = gui.add_number("To (s)", timeline.end, min=0.0, step=0.1)
-            buttons = gui.add_button_group("What is seen", (_PNG, _MP4, _CANCEL))
+            buttons = gui.add_button_group("What is seen", (_PNG, _MP4, CANCEL))
 
         async def export(event: viser.GuiEvent[Any]) -> None:
             if event.client is None:
@@ -129,24 +131,6 @@ class RecordedPanel:
                 self._cancel()
 
         buttons.on_click(export)
-
-    def _add_fork(self) -> None:
-        gui = self._gui
-        with gui.add_folder("Fork", expand_by_default=False):
-            push = gui.add_text("Push", "", hint="at this time: LINK:FX,FY,FZ in N, or nothing")
-            settings = gui.add_text("Set", "", hint="live parameters: NODE.NAME:=VALUE ...")
-            buttons = gui.add_button_group("From here", ("Fork", _CANCEL))
-
-        async def fork(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is None:
-                return
-            if buttons.value == _CANCEL:
-                self._cancel()
-            else:
-                given = settings.value.split()
-                self._actions.put(partial(self._shown.fork, push.value.strip(), given))
-
-        buttons.on_click(fork)
 
     def _cancel(self) -> None:
         """Called in the server's thread: the player's may be busy with a film."""

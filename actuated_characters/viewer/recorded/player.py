@@ -8,7 +8,7 @@ import viser
 
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.controls.actions import ActionQueue
-from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter, bind_nothing
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.recorded.controls import REFERENCE, RecordedPanel
 from actuated_characters.viewer.recorded.export import (
@@ -22,6 +22,7 @@ from actuated_characters.viewer.recorded.forking import Fork
 from actuated_characters.viewer.recorded.ghosts import Ghosts
 from actuated_characters.viewer.recorded.marks import find_marks
 from actuated_characters.viewer.recorded.plots import Plots, run_curves
+from actuated_characters.viewer.recorded.push_arrow import DrawnPush, PushArrow
 from actuated_characters.viewer.recorded.run import RecordedRun, read_run
 from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import Playback, frame_times
@@ -54,19 +55,32 @@ class RecordedPlayer:
         self._timeline = Playback(run.times)
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
+        self._push_duration = run.push_duration
+        self._arrow = PushArrow(
+            self._scene, self._timeline, self._actions, self._push_duration, self._show_push
+        )
         self._drawn = [
             DrawnCharacter(
                 self._scene.api,
                 f"{WORLD}/characters/{number}",
                 each.character,
                 each.character.effort_limits(),
-                number=number,
-                skin=skin,
+                self._arrow.bind if run.can_be_forked else bind_nothing,
+                number,
+                skin,
             )
             for number, each in enumerate(run.recordings)
         ]
+        self._arrow.draw_on(self._drawn[0])
         self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
-        self._panel = RecordedPanel(server.gui, self._scene, self._timeline, self._actions, self)
+        self._panel = RecordedPanel(
+            server.gui,
+            self._scene,
+            self._timeline,
+            self._actions,
+            self,
+            by_arrow=run.can_be_forked,
+        )
         names = self._ghosts.names
         self._panel.choose_ghosts(names, names[0] if names else REFERENCE)
         panel = self._panel
@@ -104,6 +118,7 @@ class RecordedPlayer:
         row, now = self._timeline.row, self._timeline.time
         chosen = str(self._panel.ghost.value)
         other = self._ghosts.get(chosen)
+        self._arrow.update()
         with self._server.atomic():
             for number, drawn in enumerate(self._drawn):
                 sample = self._run.sample(number, row)
@@ -188,14 +203,24 @@ class RecordedPlayer:
         if self._fork is not None:
             self._tell("error: a fork is being made; cancel it, or wait for it")
             return
+        self._timeline.plays = False
         self._fork = Fork(self._run.path, self._timeline.time, push, settings)
+        self._panel.forks.show_forking(goes_on=True)
         self._tell(f"forking at {self._timeline.time:g} s into {self._fork.directory} ...")
+
+    def discard_push(self) -> None:
+        """Remove the arrow."""
+        self._arrow.discard()
+
+    def _show_push(self, push: DrawnPush | None, let_go: bool) -> None:
+        self._panel.forks.show_push(push, self._push_duration, let_go=let_go)
 
     def cancel(self) -> None:
         """End the fork that is being made."""
         if self._fork is not None:
             self._fork.cancel()
             self._fork = None
+            self._panel.forks.show_forking(goes_on=False)
             self._tell("the fork is cancelled")
 
     def _look_at_fork(self) -> None:
@@ -204,11 +229,13 @@ class RecordedPlayer:
         if fork is None or not fork.has_ended:
             return
         self._fork = None
+        self._panel.forks.show_forking(goes_on=False)
         reason = fork.error
         try:
             if not reason:
                 ghost = self._ghosts.add(read_run(fork.directory))
                 self._panel.choose_ghosts(self._ghosts.names, ghost.name)
+                self._timeline.play()
         except ActuatedCharactersError as error:
             reason = f"error: {error}"
         fork.cancel()

@@ -15,6 +15,8 @@ from msgs_config.errors import RecordingError
 from msgs_config.messages.projectiles import BallStates
 from msgs_config.messages.state import StampedState
 
+_WRENCH_DURATION = 0.1  # s: what simulators have by default
+
 
 @dataclass(frozen=True)
 class RecordedRun:
@@ -38,6 +40,16 @@ class RecordedRun:
     def times(self) -> FloatArray:
         """Simulation time (t + 1,) of each state since the first one, s."""
         return self.scene.times
+
+    @property
+    def can_be_forked(self) -> bool:
+        """Whether it is of one character of this project's simulator, as `fork` wants it."""
+        return len(self.recordings) == 1 and bool(self.recordings[0].parameters)
+
+    @property
+    def push_duration(self) -> float:
+        """How long a push acts, s, at first."""
+        return float(self.recordings[0].parameters.get("wrench_duration", _WRENCH_DURATION))
 
     def sample(self, character: int, row: int) -> CharacterSample:
         """What is known of one character, by its number, in a state."""

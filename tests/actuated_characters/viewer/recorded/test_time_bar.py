@@ -18,14 +18,17 @@ pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
 PUSH = "root:0,90,0@0.5"
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def make_walk(directory: Path) -> Path:
     """One second, 240 ticks, with a push from 0.5 to 0.6 s."""
-    directory = tmp_path_factory.mktemp("runs") / "walk"
     reference, simulator = {"reference": "clip", "clip": "walk"}, {"wrench_duration": 0.1}
     plan = make_plan("humanoid", 1.0, reference, simulator, {"root_assistance": True})
     run_plan_here(plan, directory, pushes=[parse_push(PUSH, plan)])
     return directory
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_walk(tmp_path_factory.mktemp("runs") / "walk")
 
 
 @pytest.fixture
