@@ -25,6 +25,7 @@ class Mark:
     text: str
     label: str = ""  # what stands on a span
     color: str = ""  # of a mode, as a page has it
+    lane: int = 0  # number of the character that has the mode
 
 
 def find_marks(run: RecordedRun) -> list[Mark]:
@@ -37,7 +38,7 @@ def find_marks(run: RecordedRun) -> list[Mark]:
     marks = [
         mark
         for number, recording in enumerate(run.recordings)
-        for mark in _marks_of(recording, several=several, first=number == 0)
+        for mark in _marks_of(recording, several=several, number=number)
     ]
     last = float(run.times[-1])
     marks += [*_keyframes(run), Mark(END, last, last, "the last state")]
@@ -46,8 +47,8 @@ def find_marks(run: RecordedRun) -> list[Mark]:
     return [replace(mark, start=mark.start + since, end=mark.end + since) for mark in marks]
 
 
-def _marks_of(recording: Recording, *, several: bool, first: bool) -> list[Mark]:
-    """Events of one character of `several`, and hits; the world's belong to the first one."""
+def _marks_of(recording: Recording, *, several: bool, number: int) -> list[Mark]:
+    """Events of one character, by its number, and hits; the world's are the first character's."""
     events = find_events(recording, fall_time(recording) if recording.parameters else None)
     colors = mode_colors(events)
     name = f"{recording.name}: " if several else ""
@@ -59,9 +60,10 @@ def _marks_of(recording: Recording, *, several: bool, first: bool) -> list[Mark]
             name + each.text,
             each.label,
             colors[each.label] if each.kind == MODE else "",
+            number if each.kind == MODE else 0,
         )
         for each in events
-        if first or each.kind not in (THROW, RESET)
+        if number == 0 or each.kind not in (THROW, RESET)
     ]
     return marks + [
         Mark(HIT, hit.time, hit.time, f"{name}{hit.ball} hits {hit.link}: {hit.impulse:.3g} N s")
@@ -71,6 +73,8 @@ def _marks_of(recording: Recording, *, several: bool, first: bool) -> list[Mark]
 
 def _keyframes(run: RecordedRun) -> list[Mark]:
     """Where a fork can begin, if that is not at the first state alone."""
+    if not run.can_be_forked:
+        return []
     found = find_keyframes(find_bag(run.path))
     first_ns, last_ns = (int(run.recordings[0].stamps_ns[row]) for row in (0, -1))
     stamps = [place.stamp_ns for place in (found.places if found is not None else ())]

@@ -37,9 +37,14 @@
     const made = make(isMode ? "div" : "button", `${isMode ? "" : "mark "}${mark.kind}`, track);
     made.style.left = percent(mark.start);
     if (mark.end > mark.start) made.style.width = `calc(${percent(mark.end)} - ${percent(mark.start)})`;
-    if (isMode) made.style.background = mark.color;
     if (ghost) made.classList.add("ghost");
-    made.textContent = mark.label;
+    if (isMode) { // of several characters one below the other
+      const lanes = 1 + Math.max(...told.marks.map(({ lane }) => lane));
+      const [top, height] = ghost ? [43, 11] : [0, 14];
+      made.style.cssText += `background: ${mark.color}; top: ${top + height * mark.lane / lanes}px;
+        height: ${height / lanes}px`;
+      if (lanes === 1) made.textContent = mark.label;
+    }
     made.dataset.made = "";
     if (!isMode) {
       made.setAttribute("aria-label", `${mark.start.toFixed(2)} s: ${ghost}${mark.text}`);
