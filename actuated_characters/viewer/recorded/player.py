@@ -55,36 +55,13 @@ class RecordedPlayer:
         self._timeline = Playback(run.times)
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
-        self._push_duration = run.push_duration
         self._arrow = PushArrow(
-            self._scene, self._timeline, self._actions, self._push_duration, self._show_push
+            self._scene, self._timeline, self._actions, run.push_duration, self._show_push
         )
-        self._drawn = [
-            DrawnCharacter(
-                self._scene.api,
-                f"{WORLD}/characters/{number}",
-                each.character,
-                each.character.effort_limits(),
-                self._arrow.bind if run.can_be_forked else bind_nothing,
-                number,
-                skin,
-            )
-            for number, each in enumerate(run.recordings)
-        ]
-        self._arrow.draw_on(self._drawn[0])
+        self._drawn = self._add_characters(skin)
         self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
-        self._panel = RecordedPanel(
-            server.gui,
-            self._scene,
-            self._timeline,
-            self._actions,
-            self,
-            by_arrow=run.can_be_forked,
-        )
-        names = self._ghosts.names
-        self._panel.choose_ghosts(names, names[0] if names else REFERENCE)
-        panel = self._panel
-        self._bar = TimeBar(server, self._timeline, panel.slider, panel.playback)
+        self._panel = self._add_panel()
+        self._bar = TimeBar(server, self._timeline, self._panel.slider, self._panel.playback)
         self._marks = find_marks(run)
         self._plots, self._curves = Plots(server.gui), run_curves(run, run.name)
         self._panel.character.options = tuple(self._curves)
@@ -94,6 +71,37 @@ class RecordedPlayer:
         self._timeline.play()
         self._draw(0.0)
         self._scene.frame_characters(self._drawn)
+
+    def _add_characters(self, skin: GivenSkin | None) -> list[DrawnCharacter]:
+        """Add all characters, with an arrow on the first one if the run can be forked."""
+        drawn = [
+            DrawnCharacter(
+                self._scene.api,
+                f"{WORLD}/characters/{number}",
+                each.character,
+                each.character.effort_limits(),
+                self._arrow.bind if self._run.can_be_forked else bind_nothing,
+                number,
+                skin,
+            )
+            for number, each in enumerate(self._run.recordings)
+        ]
+        self._arrow.draw_on(drawn[0])
+        return drawn
+
+    def _add_panel(self) -> RecordedPanel:
+        """Add the panel, with the first ghost chosen if there is one."""
+        panel = RecordedPanel(
+            self._server.gui,
+            self._scene,
+            self._timeline,
+            self._actions,
+            self,
+            by_arrow=self._run.can_be_forked,
+        )
+        names = self._ghosts.names
+        panel.choose_ghosts(names, names[0] if names else REFERENCE)
+        return panel
 
     def play(self, fps: float, rejections: Rejections) -> None:
         """Show it until an interruption, and print what is rejected."""
@@ -213,7 +221,7 @@ class RecordedPlayer:
         self._arrow.discard()
 
     def _show_push(self, push: DrawnPush | None, let_go: bool) -> None:
-        self._panel.forks.show_push(push, self._push_duration, let_go=let_go)
+        self._panel.forks.show_push(push, self._run.push_duration, let_go=let_go)
 
     def cancel(self) -> None:
         """End the fork that is being made."""

@@ -97,8 +97,9 @@ class PushArrow:
         force = spring_force(STIFFNESS, centre, pointer)
         x, y, z = np.round(force).astype(int).tolist()
         push = DrawnPush(self._drawn.character.links[row].name, (x, y, z))
-        if push.size < _LEAST_FORCE and is_end:
-            self.discard()
+        if push.size < _LEAST_FORCE:
+            if is_end:
+                self.discard()
             return
         self._push = push
         self._show(centre, centre + np.array(push.force) / STIFFNESS)

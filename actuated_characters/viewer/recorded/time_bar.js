@@ -54,8 +54,9 @@
 
   async function fetchMarks(version) {
     asked = version;
-    told = await (await fetch(ADDRESS)).json().catch(() => null);
-    if (!told?.slider) { told = null; asked = -1; return; }
+    const found = await fetch(ADDRESS).then(response => response.json()).catch(() => null);
+    if (!found?.slider) { setTimeout(() => { asked = -1; }, 1000); return; }
+    told = found;
     track.querySelectorAll("[data-made]").forEach(each => each.remove());
     const ghost = told.ghost && `${told.ghost}: `;
     told.ghostMarks = told.ghostMarks.filter(({ kind, start }) => start <= told.last
@@ -146,9 +147,10 @@
     requestAnimationFrame(show);
     const at = window.__viserMutable?.nodePoseData?.[FRAME]?.position;
     if (!at) return;
-    if (at[2] && at[2] !== asked) fetchMarks(at[2]);
+    const version = Math.floor(at[2] / 2);
+    if (version && version !== asked) fetchMarks(version);
     if (!told) return;
-    [time, plays] = [at[0], at[1] > 0.5];
+    [time, plays] = [at[0] + at[1], at[2] % 2 === 1];
     const line = `${time.toFixed(3)} / ${told.last.toFixed(2)} s`;
     if (line + plays === spoken) return;
     spoken = line + plays;

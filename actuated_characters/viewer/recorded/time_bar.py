@@ -8,6 +8,8 @@ a frame that nobody sees; and the marks, which seldom change, are a text that it
 """
 
 import json
+import math
+import secrets
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +20,7 @@ from actuated_characters.viewer.recorded.timeline import Playback
 from actuated_characters.viewer.web.server import ViewerServer
 
 _FRAME, _ADDRESS = "/time_line", "/time_line.json"
+_VERSIONS = 10_000
 _FILES = [Path(__file__).with_name(name) for name in ("time_bar.js", "time_bar.css")]
 
 
@@ -29,7 +32,8 @@ class TimeBar:
     ) -> None:
         """Add it; the panel's `slider` sets the time, and `playback` has its buttons."""
         self._timeline = timeline
-        self._version = 0
+        # no other viewer's on this port before, to which a page was connected
+        self._version = secrets.randbelow(_VERSIONS)
         self._frame = server.scene.add_frame(_FRAME, show_axes=False)
         self._told: dict[str, Any] = {
             "first": float(timeline.times[0]),
@@ -49,6 +53,11 @@ class TimeBar:
         self._text = json.dumps({**self._told, **lists, "ghost": ghost, "version": self._version})
 
     def show_time(self) -> None:
-        """Bring all pages to the present time."""
+        """Bring all pages to the present time.
+
+        viser sends no position that is within 1e-5 of the last one, as a share: so seconds and
+        their fraction are two numbers, and no number is large.
+        """
         timeline = self._timeline
-        self._frame.position = (timeline.time, float(timeline.plays), float(self._version))
+        fraction, seconds = math.modf(timeline.time)
+        self._frame.position = (fraction, seconds, 2.0 * self._version + float(timeline.plays))

@@ -74,15 +74,15 @@ def type_into(browser: Browser, label: str, value: str) -> None:
     }})({field(label)})""")
 
 
-def draw_arrow(browser: Browser) -> str:
-    """Drag the body to the right, and let go; returns what the field of the push says then."""
+def draw_arrow(browser: Browser, then: str = "Fork from here") -> str:
+    """Drag the body to the right, let go, and wait; what the field of the push says then."""
     wait_until(lambda: body_of(browser.pixels()).sum() > LEAST_PIXELS, "the walker", SOON)
     x, y = grip_of(body_of(browser.pixels()))
     drag(browser, x, y, steps=8)
     wait_until(lambda: "push on " in text_of(browser), "what the arrow means", SOON)
     assert not browser.click("Fork from here")  # the arrow is still being drawn
     browser.mouse("mouseReleased", x + 64, y)
-    wait_until(lambda: "Fork from here" in text_of(browser), "the offer", SOON)
+    wait_until(lambda: then in text_of(browser), then, SOON)
     return str(browser.evaluate(f"{field('Push')}.value"))
 
 
@@ -97,7 +97,7 @@ def test_an_arrow_on_the_paused_body_becomes_a_push_of_a_fork_that_plays_beside(
     check_that_a_mistake_is_one_line(browser)
     check_that_an_arrow_goes_with_its_moment(browser)
     check_that_a_fork_can_be_cancelled(browser, walk)
-    check_that_the_fork_has_the_push_of_the_arrow(browser, walk)
+    check_that_the_fork_at_once_has_the_push_of_the_arrow(browser, walk)
     assert not browser.console
 
 
@@ -128,9 +128,9 @@ def check_that_a_fork_can_be_cancelled(browser: Browser, walk: Path) -> None:
     wait_until(lambda: "Forking" not in text_of(browser), "nothing to be cancelled", SOON)
 
 
-def check_that_the_fork_has_the_push_of_the_arrow(browser: Browser, walk: Path) -> None:
-    asked = draw_arrow(browser)
-    browser.click("Fork from here")
+def check_that_the_fork_at_once_has_the_push_of_the_arrow(browser: Browser, walk: Path) -> None:
+    assert browser.click("At once")
+    asked = draw_arrow(browser, "forking at 0.2 s")
     wait_until(lambda: "the ghost" in text_of(browser), "the fork", SOON)
 
     (fork,) = (each for each in walk.parent.glob("walk-fork*") if (each / "summary.json").exists())
@@ -150,5 +150,6 @@ def check_that_the_fork_has_the_push_of_the_arrow(browser: Browser, walk: Path) 
     assert 20.0 < np.linalg.norm(force) < 400.0
     right = np.cross(np.subtract(LOOK_AT, EYE), (0.0, 0.0, 1.0))
     assert force @ (right / np.linalg.norm(right)) > 0.5 * np.linalg.norm(force)
-    green = browser.evaluate("document.querySelectorAll('#time-line .ghost.push').length")
-    assert green == 2  # that of the run, which is repeated, and the new one
+    # the push of the run, which is repeated, and the new one, in the time line's lane of the ghost
+    marks = "document.querySelectorAll('#time-line .ghost.push').length"
+    wait_until(lambda: browser.evaluate(marks) == 2, "the pushes of the ghost", SOON)
