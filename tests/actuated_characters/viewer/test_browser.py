@@ -1,5 +1,6 @@
 """The viewer in a real browser: what its page shows, and what a mouse does to the simulation."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -24,6 +25,7 @@ Mask = NDArray[np.bool_]
 
 WARM = 8  # of 255: how much redder than blue; ground and sky are bluer, a ghost is green
 LEAST_PIXELS = 200  # of a character
+NEAR = 60.0  # pixels between two pictures of it, walking in one place
 BODY = (0.3, 0.55, 0.25, 0.8)  # left, right, top, bottom as shares of the page: without the panel
 
 
@@ -83,18 +85,29 @@ def grip_of(body: Mask) -> tuple[float, float]:
     inner = body.copy()
     for axis, way in ((0, -2), (0, 2), (1, -2), (1, 2)):
         inner &= np.roll(body, way, axis)
-    places = np.argwhere(inner)
+    places = np.argwhere(inner if inner.any() else body)
     y, x = places[np.argmin(np.abs(places - np.argwhere(body).mean(axis=0)).sum(axis=1))]
     return float(x), float(y)
 
 
 def until_seen(browser: Browser, viewer: Process) -> tuple[float, float]:
-    """Load the page, and wait for the character; a pixel (x, y) in the middle of it."""
+    """Load the page, and wait for the character; a pixel (x, y) in the middle of it.
+
+    The camera goes nearer once it is there: so two pictures must have it at nearly one place.
+    """
     browser.open(address_of(viewer))
-    wait_until(
-        lambda: body_of(browser.pixels()).sum() > LEAST_PIXELS, "a character on the page", SOON
-    )
-    return grip_of(body_of(browser.pixels()))
+    places: list[tuple[float, float] | None] = [None]
+
+    def rests() -> bool:
+        body = body_of(browser.pixels())
+        places.append(grip_of(body) if body.sum() > LEAST_PIXELS else None)
+        before, now = places[-2:]
+        return before is not None and now is not None and math.dist(before, now) < NEAR
+
+    wait_until(rests, "a character on the page", SOON)
+    place = places[-1]
+    assert place is not None
+    return place
 
 
 def root_of(client: SimulatorClient) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
