@@ -30,6 +30,11 @@ class RecordedWorld:
     characters: tuple[str, ...] = ()  # the names of all characters, in the order of their entry
     terrain: UrdfOptions | None = None  # what there is beside the plane
 
+    @property
+    def topics_below(self) -> str:
+        """What the names of its simulator's topics begin with: empty, or with a slash."""
+        return f"/{self.namespace}" if self.namespace else ""
+
 
 @dataclass(frozen=True)
 class Rebuilt:

@@ -111,11 +111,14 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
     from actuated_characters.recorder.run_directory import prepare_directory
     from actuated_characters.runs.plan import count_ticks
     from actuated_characters.scenes.execution import play_scene
+    from actuated_characters.viewer.controls.shown_parameters import check_settings
+    from actuated_characters.viewer.parameters import ViewerSettings
 
     rate = scene.simulator.get("rate")
     if not isinstance(rate, int) or rate < 1:
         raise ConfigurationError(f"scene '{scene.name}': sim_node's 'rate' is {rate}, not in Hz")
     ticks = count_ticks(options.duration, rate)
+    check_settings(ViewerSettings.given(scene.viewer))
     directory = (options.output or Path("runs") / f"play-{scene.name}").absolute()
     overwrite = options.overwrite or options.output is None
     prepare_directory(directory, overwrite=overwrite, characters=scene.characters)
@@ -166,16 +169,18 @@ def _print_figures(directory: Path, characters: list[str]) -> None:
     from actuated_characters.recorder.run_directory import metrics_directory, read_metrics
     from actuated_characters.report.metrics_plot import describe_metrics, plot_metrics
 
-    shown: dict[str, list[str]] = {}
+    shown: dict[str, dict[str, str]] = {}
     for name in characters or [""]:
         folder = metrics_directory(directory, name, is_alone=not name)
         plot_metrics(folder)
-        for figure, value in describe_metrics(read_metrics(folder)[0]):
-            shown.setdefault(figure, []).append(value)
-    columns: tuple[str, ...] = ("figure", *(characters or ["value"]))
-    rows: list[tuple[str, ...]] = [(figure, *values) for figure, values in shown.items()]
+        shown[name] = dict(describe_metrics(read_metrics(folder)[0]))
+    figures = dict.fromkeys(figure for each in shown.values() for figure in each)
+    columns = ["figure", *(characters or ["value"])]
+    rows = [[figure, *(each.get(figure, "-") for each in shown.values())] for figure in figures]
     if len(characters) > _MOST_COLUMNS:  # a row each, and the rest is in the directory
-        columns = ("character", *_FIGURES_OF_MANY)
-        each = zip(characters, *(shown[name] for name in _FIGURES_OF_MANY), strict=True)
-        rows = list(each)
+        columns = ["character", *_FIGURES_OF_MANY]
+        rows = [
+            [name, *(each.get(figure, "-") for figure in _FIGURES_OF_MANY)]
+            for name, each in shown.items()
+        ]
     Console().print(make_table(f"results in {directory}", columns, rows))

@@ -90,7 +90,7 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
             raise ConfigurationError(
                 f"{path}: '{_OPPONENT}' of '{node}' is {opponent}, which is no other character"
             )
-    return Scene(path.stem, _title(text), nodes, _parameters_of(VIEWER, content))
+    return Scene(path.stem, _title(text), nodes, _beside(path, _parameters_of(VIEWER, content)))
 
 
 def _agreed(simulator: Parameters, character: str) -> Parameters:
@@ -103,10 +103,13 @@ def _agreed(simulator: Parameters, character: str) -> Parameters:
 
 
 def _beside(scene: Path, given: Parameters) -> Parameters:
-    """The parameters, with the names of files that lie beside the scene's as whole paths."""
+    """The parameters, with names of files that lie beside the scene's as whole paths.
+
+    A name without a suffix is none of a file: a clip is called `walk`, too.
+    """
     return {
         name: str(scene.parent.absolute() / value)
-        if isinstance(value, str) and value and (scene.parent / value).is_file()
+        if isinstance(value, str) and Path(value).suffix and (scene.parent / value).is_file()
         else value
         for name, value in given.items()
     }

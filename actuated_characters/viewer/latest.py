@@ -1,6 +1,7 @@
 """The newest message of each topic: whatever comes between two looks is never kept.
 
-The subscriptions are best effort: no publisher waits for them, or sends anything again.
+The subscriptions are best effort: no publisher waits for them, or sends anything again. Only what
+is latched, such as modes, needs to be reliable.
 """
 
 from dataclasses import replace

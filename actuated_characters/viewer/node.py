@@ -15,13 +15,13 @@ from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.panel import ControlPanel, Subject
 from actuated_characters.viewer.controls.shown_parameters import (
     ShownParameter,
-    check_controls,
+    check_settings,
     shown_parameters,
 )
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.drawing.terrain import draw_terrain
-from actuated_characters.viewer.parameters import PARAMETERS, SHOWN, ViewerSettings
+from actuated_characters.viewer.parameters import PARAMETERS, ViewerSettings
 from actuated_characters.viewer.simulators import WatchedNamespace, WatchedSimulators
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck
@@ -36,7 +36,7 @@ from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters
 from msgs_config.character.model import Character
-from msgs_config.errors import ActuatedCharactersError, ConfigurationError, SkinError, one_of
+from msgs_config.errors import ActuatedCharactersError, SkinError
 from msgs_config.messages import topics
 from msgs_config.parameters import resolve
 from msgs_config.runtime.process import StopSignal
@@ -62,10 +62,7 @@ class ViewerNode(Node):
         declare(self, PARAMETERS, values)
         settings = ViewerSettings.of(values)
         self._period = 1.0 / settings.fps
-        check_controls(settings.controls)
-        for name in settings.hidden:
-            if name not in SHOWN:
-                raise ConfigurationError(one_of("'hidden'", name, list(SHOWN)))
+        check_settings(settings)
         self._skin = _read_skin(settings)
         self._once_logger = OnceLogger(self.get_logger())
         host = settings.host
@@ -121,6 +118,7 @@ class ViewerNode(Node):
         self._simulators.find_simulators()
         for watched in self._simulators.gone():
             self._remove(watched.below)
+            self._forget_world(watched.simulator)
         for sentence in self._rejections.take():
             self.get_logger().warning(sentence)
 
@@ -218,12 +216,11 @@ class ViewerNode(Node):
     def _draw_terrain(self, watched: WatchedNamespace) -> None:
         """Draw the ground of a character's world as it is described now."""
         assert watched.rebuilt is not None
-        terrain, name = watched.rebuilt.world.terrain, f"{WORLD}/terrain{watched.simulator}/shapes"
+        terrain, name = watched.rebuilt.world.terrain, _terrain_name(watched.simulator)
         text = "" if terrain is None else terrain.urdf_text
         if text == (self._terrains[name][0] if name in self._terrains else ""):
             return
-        self._scene.api.remove_by_name(name)
-        self._terrains.pop(name, None)
+        self._remove_terrain(name)
         if terrain is not None:
             self._terrains[name] = text, draw_terrain(self._scene.api, name, terrain)
 
@@ -236,6 +233,18 @@ class ViewerNode(Node):
                 self._log(f"'{character.name}' has its own skin: {error}")
                 return None
         return self._skin
+
+    def _forget_world(self, simulator: str) -> None:
+        """Remove terrain and balls of a simulator that has no characters any more."""
+        if any(each.simulator == simulator for each in self._simulators.characters):
+            return
+        self._remove_terrain(_terrain_name(simulator))
+        if (balls := self._balls.pop(simulator, None)) is not None:
+            balls.remove()
+
+    def _remove_terrain(self, name: str) -> None:
+        if self._terrains.pop(name, None) is not None:
+            self._scene.api.remove_by_name(name)
 
     def _remove(self, below: str) -> None:
         if (drawn := self._drawn.pop(below, None)) is not None:
@@ -251,3 +260,8 @@ def _read_skin(settings: ViewerSettings) -> GivenSkin | None:
     return GivenSkin.read(
         Path(settings.skin), Path(settings.skin_map) if settings.skin_map else None
     )
+
+
+def _terrain_name(simulator: str) -> str:
+    """The name in the scene of the terrain in a simulator's world."""
+    return f"{WORLD}/terrain{simulator}/shapes"

@@ -26,8 +26,10 @@ from msgs_config.bus.node import Publisher
 from msgs_config.errors import CommandError
 from msgs_config.messages import topics
 from msgs_config.messages.projectiles import ThrowCodec
+from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.topic import Topic
 from msgs_config.messages.wrenches import WrenchArrays, encode_wrenches
+from sim_node.physics.balls.throws import MOST_BALLS
 
 _SPRING = (230, 60, 20)
 _GRAVITY, _WRENCH_DURATION = 9.81, 0.1  # m/s^2, s: what simulators have by default
@@ -57,13 +59,19 @@ class Hands:
             self._publishers[name] = create_publisher(self._node, replace(topic, name=name))
         return self._publishers[name]
 
-    def pour(self, character: LiveCharacter) -> None:
-        """Let balls fall on a character."""
-        world, session = character.rebuilt.world, character.rebuilt.known.session
-        simulator = f"/{world.namespace}" if world.namespace else ""
-        for throw in pour_balls(character.root, self.ball_mass):
-            encoded = ThrowCodec(session).encode(0, throw)
-            self._publisher(simulator, topics.THROW).publish(encoded)
+    def pour(self, character: LiveCharacter) -> str:
+        """Let balls fall on a character; returns a sentence about them."""
+        try:
+            throws = pour_balls(character.root, self.ball_mass)
+        except CommandError as error:
+            return f"no balls: {error}"
+        for throw in throws:
+            self._send(character, throw)
+        return f"{len(throws)} balls; an episode has at most {MOST_BALLS}, then Reset"
+
+    def _send(self, character: LiveCharacter, throw: ProjectileThrow) -> None:
+        world, codec = character.rebuilt.world, ThrowCodec(character.rebuilt.known.session)
+        self._publisher(world.topics_below, topics.THROW).publish(codec.encode(0, throw))
 
     def bind(self, below: str, drawn: Callable[[], LiveCharacter | None]) -> Bind:
         """Let the links of a character, as it is drawn then, be dragged and clicked on."""
@@ -123,8 +131,7 @@ class Hands:
             self._draw_spring(client, drag, grabbed, pointer)
 
     def _push(self, character: LiveCharacter, drag: Drag, force: FloatArray, stamp_ns: int) -> None:
-        known, world = character.rebuilt.known, character.rebuilt.world
-        simulator = f"/{world.namespace}" if world.namespace else ""
+        known, simulator = character.rebuilt.known, character.rebuilt.world.topics_below
         began_with = float(known.parameters.get("wrench_duration", _WRENCH_DURATION))
         duration = max(
             self.wrench_durations.get(simulator, began_with), 1.0 / known.parameters["rate"]
@@ -164,7 +171,7 @@ class Hands:
         character = drawn()
         if character is None:
             return
-        known, world = character.rebuilt.known, character.rebuilt.world
+        known = character.rebuilt.known
         try:
             throw = aim_throw(
                 np.array(event.ray_origin) + self._scene.offset,
@@ -177,5 +184,4 @@ class Hands:
         except CommandError as error:
             self._node.get_logger().warning(f"no throw: {error}")
             return
-        simulator = f"/{world.namespace}" if world.namespace else ""
-        self._publisher(simulator, topics.THROW).publish(ThrowCodec(known.session).encode(0, throw))
+        self._send(character, throw)

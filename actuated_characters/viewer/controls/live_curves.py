@@ -16,10 +16,12 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
 _WINDOW = 8.0  # s that a curve shows
-_MOST = 400  # points of a curve
+_STEP = 0.02  # s between two points of a curve
 _PERIOD = 0.2  # s of wall time between two pictures of a curve: the page draws each anew
+_ASKING_PERIOD = 2.0  # s of wall time between two looks at parameters that others may set
 _COLOURS = {"it is": "#2a6fbb", "it should be": "#40be6e", "theory": "#d9480f"}
 _ASPECT = 1.6
+_MOST_POINTS = round(_WINDOW / _STEP)
 
 
 class ShownCurves:
@@ -28,13 +30,14 @@ class ShownCurves:
     def __init__(self, gui: viser.GuiApi, requests: Requests, names: Sequence[str]) -> None:
         """Show degrees of freedom of these names, of those that the character has."""
         self._gui, self._requests, self._names = gui, requests, names
-        self._folder = gui.add_folder("Over time", visible=bool(names))
+        self._folder = gui.add_folder("Over time", visible=False)
         self._character: Character | None = None
         self._expected: ExpectedMotion | None = None
         self._points: dict[str, deque[tuple[float, float, float, float]]] = {}
         self._plots: dict[str, Any] = {}
-        self._next = 0.0  # s, wall time of the next picture
-        self._last = 0.0  # s, simulated
+        self._next_picture = self._next_look = 0.0  # s, wall time
+        self._waits = False  # for the controller to tell its parameters
+        self._last = self._last_point = -np.inf  # s, simulated
 
     def show(self, controller: str, character: Character, sample: CharacterSample) -> None:
         """Take the newest state of a character with this controller, and draw now and then.
@@ -45,23 +48,45 @@ class ShownCurves:
             return
         if character is not self._character:
             self._choose(character)
-        self._draw(controller)
+        self._look(controller)
+        self._draw()
         time = 1e-9 * sample.state.stamp_ns
         if time < self._last:
             self._points.clear()
-        if time == self._last:
-            return
-        if self._expected is not None:
+            self._last_point = -np.inf
+        if time != self._last and self._expected is not None:
             self._expected.take(sample)
-        layout, expected = character.layout, self._expected
         self._last = time
-        for name in self._names:
-            if name not in layout.dof_names:
-                continue
-            at = layout.dof_names.index(name)
+        if time >= self._last_point + _STEP:
+            self._last_point = time
+            self._add_points(time, sample)
+
+    def look_soon(self) -> None:
+        """Ask for the controller's parameters again: one may have been set."""
+        self._next_look = 0.0
+
+    def _look(self, controller: str) -> None:
+        now = monotonic()
+        if self._expected is None or self._waits or now < self._next_look:
+            return
+        self._next_look, self._waits = now + _ASKING_PERIOD, True
+        expected = self._expected
+
+        def take(values: dict[str, object]) -> None:
+            self._waits = False
+            expected.set(values)
+
+        self._requests.get(controller, expected.parameters, take)
+
+    def _add_points(self, time: float, sample: CharacterSample) -> None:
+        assert self._character is not None
+        assert sample.state is not None
+        names = self._character.layout.dof_names
+        theory = np.nan if self._expected is None else self._expected.at(time)
+        for name in set(self._names).intersection(names):
+            at = names.index(name)
             wanted = np.nan if sample.reference is None else float(sample.reference[at])
-            theory = np.nan if expected is None else expected.at(time)
-            points = self._points.setdefault(name, deque(maxlen=_MOST))
+            points = self._points.setdefault(name, deque(maxlen=_MOST_POINTS))
             points.append((time, float(sample.state.position[at]), wanted, theory))
 
     def _choose(self, character: Character) -> None:
@@ -72,13 +97,11 @@ class ShownCurves:
             plot.remove()
         self._plots.clear()
 
-    def _draw(self, controller: str) -> None:
+    def _draw(self) -> None:
         now = monotonic()
-        if now < self._next:
+        if now < self._next_picture:
             return
-        self._next = now + _PERIOD
-        if self._expected is not None:
-            self._requests.get(controller, self._expected.parameters, self._expected.set)
+        self._next_picture = now + _PERIOD
         for name, points in self._points.items():
             values = np.array(points).T
             data = tuple(values[:, values[0] >= values[0, -1] - _WINDOW])
@@ -86,6 +109,7 @@ class ShownCurves:
                 self._plots[name].data = data
             elif len(points) > 1:
                 self._plots[name] = self._add_plot(name, data)
+        self._folder.visible = bool(self._plots)
 
     def _add_plot(self, title: str, data: tuple[FloatArray, ...]) -> Any:
         with self._folder:

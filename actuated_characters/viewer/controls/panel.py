@@ -116,7 +116,7 @@ class ControlPanel:
     def _pour(self, below: str) -> None:
         character = self._characters.get(below)
         if character is not None:
-            self._hands.pour(character)
+            self.tell(self._hands.pour(character))
 
     def _add_shown(self) -> None:
         gui = self._gui
@@ -182,6 +182,7 @@ class ControlPanel:
     def tell(self, sentence: str) -> None:
         """Show a sentence, of a node for instance, as it is."""
         self._told.content = as_text(sentence or _HELP)
+        self._curves.look_soon()
 
     def _tell_of(self, node: str, sentence: str) -> None:
         self.tell(f"{node}: {sentence}")

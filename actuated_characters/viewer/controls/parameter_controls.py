@@ -36,7 +36,9 @@ class ParameterControls:
         self._prefix = ""  # begins the names of the character's own parameters of its simulator
         self._shown: Mapping[str, tuple[ShownParameter, ...]] = {}
         self._folders: dict[str, Any] = {}
-        self._controls: dict[str, tuple[ShownParameter, Any]] = {}  # by the parameter's name
+        self._controls: dict[tuple[str, str], tuple[ShownParameter, Any]] = {}
+        """By the node whose value is shown, and the parameter's name."""
+        self._whole: set[tuple[str, str]] = set()  # those of them that are whole numbers
 
     def choose(
         self, nodes: dict[str, str], name: str, shown: Mapping[str, tuple[ShownParameter, ...]]
@@ -58,7 +60,7 @@ class ParameterControls:
     def _build(self) -> None:
         for folder in self._folders.values():
             folder.remove()
-        self._folders, self._controls = {}, {}
+        self._folders, self._controls, self._whole = {}, {}, set()
         for title, parameters in self._shown.items():
             is_first, order = not self._folders, self._order if title == TO_TRY else None
             folder = self._gui.add_folder(
@@ -71,7 +73,7 @@ class ParameterControls:
                     handle.on_update(
                         self._later(partial(self._set, shown), partial(getattr, handle, "value"))
                     )
-                    self._controls[shown.name] = shown, handle
+                    self._controls[shown.key] = shown, handle
 
     def _add(self, shown: ShownParameter) -> Any:
         if shown.options:
@@ -82,26 +84,31 @@ class ParameterControls:
             shown.label, *shown.range, initial_value=shown.range[0], visible=False
         )
 
-    def _ask(self, names: Iterable[str]) -> None:
+    def _ask(self, keys: Iterable[tuple[str, str]]) -> None:
         """Ask the nodes for the values in force of parameters."""
         for node, whole in self._nodes.items():
-            own = [name for name in names if self._controls[name][0].nodes[0] == node]
+            own = [name for of, name in keys if of == node]
             if own:
-                self._requests.get(whole, own, self._take)
+                self._requests.get(whole, own, partial(self._take, node))
 
-    def _take(self, values: dict[str, object]) -> None:
+    def _take(self, node: str, values: dict[str, object]) -> None:
         """Show the values of the parameters that a node has."""
         for name, value in values.items():
-            shown, handle = self._controls.get(name, (None, None))
+            shown, handle = self._controls.get((node, name), (None, None))
             if shown is not None:
                 self._show(shown, handle, value)
         for title, parameters in self._shown.items():
             self._folders[title].visible = any(
-                self._controls[shown.name][1].visible for shown in parameters
+                self._controls[shown.key][1].visible for shown in parameters
             )
 
-    @staticmethod
-    def _show(shown: ShownParameter, handle: Any, value: Any) -> None:
+    def _show(self, shown: ShownParameter, handle: Any, value: Any) -> None:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if shown.range is not None and not is_number:
+            self._tell(f"{shown.name} is {value}, which no slider can show")
+            return
+        if isinstance(value, int) and is_number:
+            self._whole.add(shown.key)
         handle.visible = True
         if shown.options and value not in handle.options:
             handle.options = (*shown.options, value)
@@ -113,6 +120,8 @@ class ParameterControls:
     def _set(self, shown: ShownParameter, value: Any) -> None:
         if shown.has_no_limit and shown.range is not None and value >= shown.range[1]:
             value = math.inf
+        elif shown.key in self._whole:
+            value = round(value)
         for node in shown.nodes:
             told = partial(self._told, shown, value, node)
             self._requests.set(self._nodes[node], shown.name, value, told)
@@ -123,7 +132,7 @@ class ParameterControls:
         waits = shown in self._shown.get(AT_RESET, ())
         self._tell(f"{shown.name} {given}: {reason or ('at the next reset' if waits else 'set')}")
         if reason:
-            self._ask([shown.name])
+            self._ask([shown.key])
             return
         for other, name, follows in shown.then:
             whole = self._prefix + name if other == SIMULATOR else name

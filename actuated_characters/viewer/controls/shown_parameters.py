@@ -1,15 +1,17 @@
 """Which parameters of the nodes the panel has, and as what it shows them."""
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
+from actuated_characters.viewer.parameters import SHOWN, ViewerSettings
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS
 from controller_node.control_laws import LAWS
 from msgs_config.character.layout import ROOT
 from msgs_config.character.model import ROOT_TORQUE, Character
 from msgs_config.clips.reading import available_clips
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages import topics
 
 SIMULATOR, CONTROLLER = topics.SIM_NODE, topics.CONTROLLER_NODE
@@ -30,6 +32,11 @@ class ShownParameter:
     has_no_limit: bool = False  # the slider's largest value stands for infinity
     nodes: tuple[str, ...] = (CONTROLLER,)  # nodes that have it; the first one's value is shown
     then: tuple[tuple[str, str, str], ...] = ()  # node, name, value: set when this one was taken
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The node whose value is shown, and the parameter's name."""
+        return self.nodes[0], self.name
 
 
 _LAW = (
@@ -73,7 +80,8 @@ def parse_slider(text: str) -> ShownParameter:
     node, _, parameter = name.partition(".")
     with suppress(ValueError):
         least, most, step = map(float, numbers)
-        if node in (SIMULATOR, CONTROLLER) and parameter and label and 0.0 < step <= most - least:
+        is_range = math.isfinite(least) and math.isfinite(most) and 0.0 < step <= most - least
+        if node in (SIMULATOR, CONTROLLER) and parameter and label and is_range:
             return ShownParameter(parameter, label, range=(least, most, step), nodes=(node,))
     raise ConfigurationError(
         f"control '{text}': write it as '{CONTROLLER}.law', of a parameter that the page has, or "
@@ -81,11 +89,23 @@ def parse_slider(text: str) -> ShownParameter:
     )
 
 
+def check_settings(settings: ViewerSettings) -> None:
+    """Raise ConfigurationError if the page cannot have what it is set to have."""
+    check_controls(settings.controls)
+    for name in settings.hidden:
+        if name not in SHOWN:
+            raise ConfigurationError(one_of("'hidden'", name, list(SHOWN)))
+
+
 def check_controls(texts: Sequence[str]) -> None:
-    """Raise ConfigurationError if a text is none that `shown_parameters` takes."""
+    """Raise ConfigurationError if a text is none that `shown_parameters` takes of any character."""
+    names = [".".join(each.key) for each in (*_LAW, *_WORLD)]
+    names += [f"{CONTROLLER}.{name}" for name in ("behaviour", "clip")]
     for text in texts:
         if len(text.split()) != 1:
             parse_slider(text)
+        elif text not in names and not text.startswith(f"{CONTROLLER}.strength."):
+            raise ConfigurationError(one_of("control", text, names))
 
 
 def shown_parameters(
@@ -109,15 +129,15 @@ def shown_parameters(
         if name not in (ROOT, ROOT_TORQUE)
     )
     folders = {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
-    known = {f"{each.nodes[0]}.{each.name}": each for own in folders.values() for each in own}
+    known = {".".join(each.key): each for own in folders.values() for each in own}
     own = [
         parse_slider(text) if len(text.split()) > 1 else known[text]
         for text in first
         if len(text.split()) > 1 or text in known
     ]
-    names = {each.name for each in own}
+    keys = {each.key for each in own}
     others = {
-        title: tuple(each for each in parameters if each.name not in names)
+        title: tuple(each for each in parameters if each.key not in keys)
         for title, parameters in folders.items()
     }
     return {TO_TRY: tuple(own), **others} if own else others

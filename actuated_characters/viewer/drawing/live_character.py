@@ -36,7 +36,7 @@ class LiveCharacter(DrawnCharacter):
         self.rebuilt = rebuilt
         self._tag: NameTag | None = None
         if rebuilt.world.name:  # one of several
-            can_fall = rebuilt.known.parameters.get("gravity", 1.0) and not self._is_in_air
+            can_fall = _weighs(rebuilt)
             reader = reader_for(rebuilt.character, rebuilt.world.terrain) if can_fall else None
             self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader)
 
@@ -45,11 +45,6 @@ class LiveCharacter(DrawnCharacter):
         low, high = super().bounds()
         return low, high + (0.0 if self._tag is None else TAG_HEIGHT) * np.array((0.0, 0.0, 1.0))
 
-    @property
-    def _is_in_air(self) -> bool:
-        """Whether there is no ground in its world."""
-        return bool(self.rebuilt.known.parameters.get("terrain") == NO_GROUND)
-
     def draw(self, sample: CharacterSample) -> None:
         """Move everything to where it is now."""
         super().draw(sample)
@@ -57,9 +52,17 @@ class LiveCharacter(DrawnCharacter):
             self._tag.draw(sample.state, self.origins, sample.mode)
 
     def take(self, rebuilt: Rebuilt) -> bool:
-        """Take another description if it looks alike; whether it does."""
+        """Take another description if it looks alike, in a world alike; whether it does."""
+        if rebuilt.world != self.rebuilt.world or _weighs(rebuilt) != _weighs(self.rebuilt):
+            return False
         one, other = self.character, rebuilt.character
         if (one.links, one.layout.joints) != (other.links, other.layout.joints):
             return False
         self.rebuilt, self.effort_limits = rebuilt, rebuilt.known.effort_limits
         return True
+
+
+def _weighs(rebuilt: Rebuilt) -> bool:
+    """Whether there is gravity in a character's world, and a ground to fall to."""
+    parameters = rebuilt.known.parameters
+    return bool(parameters.get("gravity", 1.0)) and parameters.get("terrain") != NO_GROUND

@@ -13,6 +13,7 @@ from msgs_config.messages.state import StampedState
 TAG_HEIGHT = 0.3  # m, that a text needs above a character
 
 _ABOVE = 0.25  # m, from the highest link's frame to the text
+_MOST_CHARACTERS = 20  # of a mode
 _UNTOLD = "TRACK"  # the mode in which nothing happens to a character
 _UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)
 
@@ -20,7 +21,7 @@ _UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)
 def mode_of(text: str) -> str:
     """The mode that a message of `~/mode` tells, a JSON object; empty if it tells none."""
     with suppress(*_UNREADABLE):
-        return str(json.loads(text)["mode"])
+        return str(json.loads(text)["mode"])[:_MOST_CHARACTERS]
     return ""
 
 

@@ -34,6 +34,7 @@ _RIGHT: FloatArray = np.array((0.5**0.5, 0.5**0.5, 0.0))  # of a view from there
 _FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
 _SHARE = 0.62  # of the view's height that characters take
 _WIDTH_OF_HEIGHT = 1.1  # of the view, beside the panel
+_ROOM = 5.0  # m around the characters, in which a terrain is seen at first
 _TILES = 56  # along an edge of the ground
 _PIXELS_A_TILE = 36
 _ABOVE_TILES = 0.002  # of a tile's edge: where the shadow is drawn
@@ -95,12 +96,13 @@ class BrowserScene:
     ) -> None:
         """Have all pages see the characters where they are now, as large as fits.
 
-        So are other points (k, 3), m, world.
+        So are other points (k, 3), m, world, as far as they are near.
         """
         if not characters:
             return
-        boxes = [_corners(*each.bounds()) for each in characters]
-        corners = np.concatenate([*boxes, *others])
+        boxes = np.concatenate([_corners(*each.bounds()) for each in characters])
+        around = boxes.min(axis=0) - _ROOM, boxes.max(axis=0) + _ROOM
+        corners = np.concatenate([boxes, *(np.clip(each, *around) for each in others)])
         low, high = corners.min(axis=0), corners.max(axis=0)
         across = float(np.ptp(corners @ _RIGHT))
         size = max(float(high[2] - low[2]), across / _WIDTH_OF_HEIGHT)

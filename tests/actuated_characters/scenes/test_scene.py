@@ -51,6 +51,50 @@ def test_a_file_is_read_as_rcl_reads_it_and_settings_count_more(tmp_path: Path) 
     assert scene.nodes["b/controller_node"] == {"rate": 240, **own}
 
 
+def test_a_file_beside_the_scene_is_found_and_what_is_no_file_stays(tmp_path: Path) -> None:
+    for name in ("mine.urdf", "walk", "body.glb"):
+        (tmp_path / name).touch()
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "/**/sim_node: {ros__parameters: {terrain: mine.urdf}}\n"
+        "/**/controller_node: {ros__parameters: {clip: walk}}\n"
+        "/**/viewer: {ros__parameters: {skin: body.glb, about: Mine.}}\n"
+    )
+
+    scene = load_scene(str(file))
+
+    assert scene.simulator["terrain"] == str(tmp_path / "mine.urdf")
+    assert scene.nodes["controller_node"]["clip"] == "walk"
+    assert scene.viewer == {"skin": str(tmp_path / "body.glb"), "about": "Mine."}
+
+
+@pytest.mark.parametrize(
+    ("viewer", "reason"),
+    [
+        ("{hidden: [refrence]}", "unknown 'hidden' 'refrence'; did you mean 'reference'"),
+        ("{controls: [controller_node.gian_scale.p]}", "unknown control"),
+        ("{controls: [controller_node.gain_scale.p 0 .inf 1 kp]}", "write it as"),
+        ("{curve: [height]}", "curve"),
+    ],
+)
+def test_a_page_that_cannot_be_is_refused_before_the_last_results_go(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], viewer: str, reason: str
+) -> None:
+    file, before = tmp_path / "mine.yaml", tmp_path / "run"
+    file.write_text(
+        "/**/sim_node: {ros__parameters: {character: lift}}\n"
+        f"/**/viewer: {{ros__parameters: {viewer}}}\n"
+    )
+    before.mkdir()
+    (before / "summary.json").write_text("{}")
+    arguments = ["play", "--scene", str(file), "--no-view", "--overwrite", "--output", str(before)]
+
+    assert main(arguments) == 1
+
+    assert reason in capsys.readouterr().err
+    assert (before / "summary.json").read_text() == "{}"
+
+
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

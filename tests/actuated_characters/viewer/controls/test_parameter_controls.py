@@ -113,6 +113,23 @@ def test_the_clip_and_gravity_of_a_menu_come_with_the_next_reset(
     assert not np.allclose(reference.position, of_walk, rtol=0.0, atol=0.1)  # another clip's
 
 
+def test_a_slider_of_no_number_is_told_and_of_a_whole_one_sends_whole_ones(
+    processes: Processes, client: Simulated, server: ViewerServer
+) -> None:
+    processes.simulator("lift", wait_for_subscribers=1)
+    processes.controller("lift")
+    hand = Hand(server, client)
+    texts = ("controller_node.law 0 3 1 Law", "sim_node.step_count 1 20 1 Steps")
+
+    hand.controls.choose(NODES, "", shown_parameters(character("lift"), texts))
+    hand.spin_until(lambda: any("no slider can show" in told for told in hand.told), "a word")
+    steps = next(h for s, h in hand.controls._controls.values() if s.name == "step_count")
+    hand.spin_until(lambda: steps.visible, "the other one")
+
+    assert hand.set("step_count", 5.0) == "step_count 5: set"
+    assert client.get_parameters(SIMULATOR, ["step_count"]) == [5]
+
+
 def test_a_value_that_is_refused_is_told_and_the_one_in_force_comes_back(
     processes: Processes, client: Simulated, server: ViewerServer
 ) -> None:
@@ -133,7 +150,7 @@ def test_a_limit_that_is_none_is_the_sliders_end(
 ) -> None:
     processes.controller("humanoid", reference="clip", clip="walk")
     hand = Hand(server, client)
-    handle = hand.controls._controls["effort_limit.root"][1]
+    handle = hand.controls._controls[CONTROLLER, "effort_limit.root"][1]
     hand.spin_until(lambda: handle.visible, "the root's limit")
     assert handle.value == 2000.0
 

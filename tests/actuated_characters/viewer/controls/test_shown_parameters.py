@@ -57,14 +57,19 @@ def test_a_character_without_clips_has_no_menu_of_them() -> None:
     assert "gravity" in names
 
 
+def test_a_control_that_no_page_has_is_told_with_what_is_like_it() -> None:
+    with pytest.raises(ConfigurationError, match=r"did you mean 'controller_node\.gain_scale\.p'"):
+        check_controls(["controller_node.gian_scale.p"])
+
+
 def test_a_scene_has_its_own_controls_first_and_none_twice() -> None:
     texts = ("controller_node.gain_scale.p 0 9 0.5 kp", "controller_node.law", "sim_node.gravity")
     folders = shown_parameters(load_character("lift"), texts)
 
     assert next(iter(folders)) == TO_TRY
     assert [each.name for each in folders[TO_TRY]] == ["gain_scale.p", "law", "gravity"]
-    names = [each.name for folder in folders.values() for each in folder]
-    assert len(names) == len(set(names))
+    keys = [each.key for folder in folders.values() for each in folder]
+    assert len(keys) == len(set(keys))
 
 
 def test_a_slider_is_read_from_its_text() -> None:
@@ -83,6 +88,7 @@ def test_a_slider_is_read_from_its_text() -> None:
         "viewer.fps 0 9 1 fps",
         "controller_node.gain_scale.p 3 1 0.1 kp",
         "controller_node.gain_scale.p 0 1 nan kp",
+        "controller_node.gain_scale.p 0 inf 1 kp",
         "",
     ],
 )
