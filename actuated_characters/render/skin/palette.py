@@ -1,5 +1,8 @@
 """Colours of skins: a pair for each of several characters, one for its right side."""
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 
 from msgs_config.character.dynamics import DynamicsModel
@@ -13,7 +16,18 @@ _PAIRS: tuple[tuple[Quadruple, Quadruple], ...] = (
     ((0.93, 0.76, 0.38, 1.0), (0.62, 0.47, 0.20, 1.0)),
     ((0.66, 0.58, 0.78, 1.0), (0.41, 0.33, 0.55, 1.0)),
 )
+_NUMBERED = re.compile(r"_[0-9]+$")
 _MIDDLE = 0.02  # m: a link that is no farther to the right is of the trunk
+
+
+def team_numbers(names: Sequence[str]) -> list[int]:
+    """The numbers, for `skin_colors`, of characters of these names.
+
+    Names that differ in a number at their end are of one team, which has one number.
+    """
+    teams = [_NUMBERED.sub("", name) for name in names]
+    found = list(dict.fromkeys(teams))
+    return [found.index(team) for team in teams]
 
 
 def skin_colors(character: Character, number: int = 0) -> list[Quadruple]:

@@ -10,6 +10,7 @@ from msgs_config.character.dynamics import still_model
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+from msgs_config.messages.state import StampedState
 
 _DAMPED, _INTEGRATED, _UNLOADED = (
     ("pd", "stable_pd", "pd_gravity", "pid"),
@@ -17,6 +18,7 @@ _DAMPED, _INTEGRATED, _UNLOADED = (
     ("pd_gravity",),
 )
 _KNOWN_LAWS = ("p", *_DAMPED)
+_JUMP, _FASTER = 0.05, 3.0  # m, and times the speed: farther is no motion but a reset
 _TERMS = 14  # of the exponential's series: exact to rounding for arguments below one half
 
 
@@ -57,6 +59,7 @@ class ExpectedMotion:
         self._start: FloatArray = np.zeros(4)  # x - target, v, the error's integral, 1
         self._since = self._last = self._target = 0.0  # s, s, m
         self._begins = True
+        self._before: StampedState | None = None  # the last state
 
     @staticmethod
     def fits(character: Character) -> bool:
@@ -101,7 +104,7 @@ class ExpectedMotion:
         is_touched = any(
             each is not None and each.links for each in (sample.pushes, sample.contacts)
         )
-        restarts = time < self._last
+        restarts = time < self._last or self._jumps(state)
         if self._begins or is_touched or restarts or target != self._target:
             # a law begins without an integral, and keeps it where its gains change
             keeps = not restarts and self._law == self._upcoming_law
@@ -110,7 +113,16 @@ class ExpectedMotion:
             self._start = np.array((place - target, speed, integral, 1.0))
             self._since, self._target, self._begins = time, target, False
             self._matrix, self._law = self._upcoming, self._upcoming_law
-        self._last = time
+        self._last, self._before = time, state
+
+    def _jumps(self, state: StampedState) -> bool:
+        """Whether the mass has moved as none moves by itself: it was put back to its start."""
+        if (before := self._before) is None:
+            return False
+        seconds = 1e-9 * (state.stamp_ns - before.stamp_ns)
+        fastest = max(abs(float(each.velocity[0])) for each in (before, state))
+        moved = abs(float(state.position[0] - before.position[0]))
+        return moved > _JUMP + _FASTER * fastest * seconds
 
     def at(self, time: float) -> float:
         """The expected height at a time, s, in m; NaN where theory says nothing."""

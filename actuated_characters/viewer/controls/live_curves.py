@@ -21,6 +21,8 @@ _PERIOD = 0.2  # s of wall time between two pictures of a curve: the page draws 
 _ASKING_PERIOD = 2.0  # s of wall time between two looks at parameters that others may set
 _COLOURS = {"it is": "#2a6fbb", "it should be": "#40be6e", "theory": "#d9480f"}
 _ASPECT = 1.6
+_MARGIN, _LEAST_MARGIN = 0.08, 0.01  # share of the height; m or rad
+_LEAST_SHARE = 0.3  # of a plot's height that curves have, or it fits anew
 _MOST_POINTS = round(_WINDOW / _STEP)
 
 
@@ -33,7 +35,9 @@ class ShownCurves:
         self._folder = gui.add_folder("Over time", visible=False)
         self._character: Character | None = None
         self._expected: ExpectedMotion | None = None
-        self._points: dict[str, deque[tuple[float, float, float, float]]] = {}
+        self._points: dict[str, deque[tuple[float, ...]]] = {}
+        self._ranges: dict[str, tuple[float, float]] = {}
+        self._columns = 3  # of a point: time, place, and where it should be; with theory one more
         self._plots: dict[str, Any] = {}
         self._next_picture = self._next_look = 0.0  # s, wall time
         self._waits = False  # for the controller to tell its parameters
@@ -87,15 +91,18 @@ class ShownCurves:
             at = names.index(name)
             wanted = np.nan if sample.reference is None else float(sample.reference[at])
             points = self._points.setdefault(name, deque(maxlen=_MOST_POINTS))
-            points.append((time, float(sample.state.position[at]), wanted, theory))
+            point = (time, float(sample.state.position[at]), wanted, theory)
+            points.append(point[: self._columns])
 
     def _choose(self, character: Character) -> None:
         self._character = character
         self._expected = ExpectedMotion(character) if ExpectedMotion.fits(character) else None
+        self._columns = 3 if self._expected is None else 4
         self._points.clear()
         for plot in self._plots.values():
             plot.remove()
         self._plots.clear()
+        self._ranges.clear()
 
     def _draw(self) -> None:
         now = monotonic()
@@ -105,11 +112,23 @@ class ShownCurves:
         for name, points in self._points.items():
             values = np.array(points).T
             data = tuple(values[:, values[0] >= values[0, -1] - _WINDOW])
+            if name not in self._plots and len(points) > 1:
+                self._plots[name] = self._add_plot(name, data)
             if name in self._plots:
                 self._plots[name].data = data
-            elif len(points) > 1:
-                self._plots[name] = self._add_plot(name, data)
+                self._fit(name, np.array(data[1:]))
         self._folder.visible = bool(self._plots)
+
+    def _fit(self, name: str, values: FloatArray) -> None:
+        """Have a plot's height suit values (curves, points): a page cannot where some lack."""
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        before = self._ranges.get(name, (np.inf, -np.inf))
+        if before[0] <= low and high <= before[1] and high - low > _LEAST_SHARE * np.ptp(before):
+            return
+        margin = max(_MARGIN * (high - low), _LEAST_MARGIN)
+        self._ranges[name] = around = low - margin, high + margin
+        y = uplot.Scale(auto=False, range=around)
+        self._plots[name].scales = {"x": uplot.Scale(time=False), "y": y}
 
     def _add_plot(self, title: str, data: tuple[FloatArray, ...]) -> Any:
         with self._folder:
@@ -119,7 +138,7 @@ class ShownCurves:
                     uplot.Series(label="s"),
                     *(
                         uplot.Series(label=label, stroke=color, width=2)
-                        for label, color in _COLOURS.items()
+                        for label, color in list(_COLOURS.items())[: len(data) - 1]
                     ),
                 ),
                 title=title,

@@ -12,6 +12,8 @@ from actuated_characters.viewer.drawing.sample import CharacterSample
 from msgs_config.arrays import FloatArray
 from msgs_config.shared_parameters import NO_GROUND
 
+_FEW = 6  # characters whose tags are of full size
+
 
 class LiveCharacter(DrawnCharacter):
     """A drawn character, and what its simulator says of it and of its world."""
@@ -38,7 +40,8 @@ class LiveCharacter(DrawnCharacter):
         if rebuilt.world.name:  # one of several
             can_fall = _weighs(rebuilt)
             reader = reader_for(rebuilt.character, rebuilt.world.terrain) if can_fall else None
-            self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader)
+            of_many = len(rebuilt.world.characters) > _FEW
+            self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader, of_many=of_many)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """The corners (3,) of a box around it, m, world, with room for what stands above it."""

@@ -14,6 +14,7 @@ TAG_HEIGHT = 0.3  # m, that a text needs above a character
 
 _ABOVE = 0.25  # m, from the highest link's frame to the text
 _MOST_CHARACTERS = 20  # of a mode
+_SMALL = 0.6  # of the size of a text
 _UNTOLD = "TRACK"  # the mode in which nothing happens to a character
 _UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)
 
@@ -56,15 +57,24 @@ class NameTag:
     """The text over one of several characters."""
 
     def __init__(
-        self, scene: viser.SceneApi, frame: str, name: str, reader: PostureReader | None
+        self,
+        scene: viser.SceneApi,
+        frame: str,
+        name: str,
+        reader: PostureReader | None,
+        *,
+        of_many: bool = False,
     ) -> None:
         """Add it below a frame that goes along with the character, over the ground.
 
-        Without a `reader`, as of a fixed base, no falls are counted.
+        Without a `reader`, as of a fixed base, no falls are counted. Tags `of_many` are small.
         """
         self._name = name
         self._falls = None if reader is None else FallCounter(reader)
-        self._label = scene.add_label(f"{frame}/tag", name, anchor="bottom-center")
+        scale = _SMALL if of_many else 1.0
+        self._label = scene.add_label(
+            f"{frame}/tag", name, anchor="bottom-center", font_screen_scale=scale
+        )
 
     def draw(self, state: StampedState, origins: FloatArray, mode: str) -> None:
         """Show what a character is doing whose links (l, 3) are there, m, world."""

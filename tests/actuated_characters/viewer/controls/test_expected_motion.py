@@ -54,7 +54,7 @@ def test_pid_removes_the_error_that_pd_is_left_with() -> None:
 def test_it_goes_on_from_where_a_change_or_a_push_found_the_mass() -> None:
     motion = expected("pd", 100.0, 20.0)
     motion.take(sample(0.0, 0.0))
-    motion.take(sample(1.0, 0.3))  # nothing has changed: theory stays as it was
+    motion.take(sample(1.0, 0.3, 0.3))  # nothing has changed: theory stays as it was
     assert motion.at(1.0) > 0.8
     pushed = sample(1.1, 0.3, 0.5)
     pushed.pushes = WrenchArrays.of_rows(0, ["mass"], [np.ones(6)], [np.zeros(3)])
@@ -81,12 +81,24 @@ def test_pid_begins_without_an_integral_where_the_law_was_another_one() -> None:
 def test_pid_keeps_its_integral_where_its_gain_changes_and_dips() -> None:
     motion = expected("pid", 20.0, 6.0, 20.0)
     motion.take(sample(0.0, 0.0))
+    motion.take(sample(30.0, 1.0, 0.1))
     change(motion, "pid", 20.0, 6.0, 10.0)
     motion.take(sample(60.0, 1.0))
 
     # at rest the old integral carried the weight; half of it pulls half as hard
     acceleration = (motion.at(60.002) - 2.0 * motion.at(60.001) + motion.at(60.0)) / 1e-6
     assert acceleration == pytest.approx(-GRAVITY / 2.0, rel=0.02)
+
+
+def test_a_reset_begins_anew_though_time_goes_on() -> None:
+    motion = expected("pid", 100.0, 20.0, 100.0)
+    for number in range(100):
+        motion.take(sample(0.033 * number, motion.at(0.033 * number) if number else 0.0))
+    motion.take(sample(3.333, 0.0))
+    first = expected("pid", 100.0, 20.0, 100.0)
+    first.take(sample(3.333, 0.0))
+
+    assert motion.at(4.0) == first.at(4.0)
 
 
 def test_half_the_strength_is_half_the_gains() -> None:
