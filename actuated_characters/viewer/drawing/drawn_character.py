@@ -14,28 +14,20 @@ from actuated_characters.render.skin.choosing import skin_of
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import Skin
+from actuated_characters.viewer.drawing.character_marks import CharacterMarks, LinkPoses
 from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
-from actuated_characters.viewer.drawing.support import support_polygon
 from actuated_characters.viewer.parameters import SHOWN
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Shape
 from msgs_config.geometry import rotations
-from msgs_config.messages.wrenches import WrenchArrays
 
 _STRAIN_COLOR = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
 _LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
 _GHOST_OPACITY = 0.3  # where it has no skin, which is seen as an outline
-_CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
-_METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
-_MAX_ARROW_LENGTH = 2.0  # m, of an arrow
-_MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least
-_ABOVE_GROUND = 0.004  # m, height of what is drawn on the ground
-_GRAVITY = 9.81
-
 GHOST = (64, 190, 110)
 """Colour of the reference, or of another run beside it."""
 
@@ -75,9 +67,8 @@ class DrawnCharacter:
         self._scene, self._model = scene, DynamicsModel(character)
         self._all = scene.add_frame(name, show_axes=False, visible=False)  # until it is drawn
         shapes = drawn_shapes(character)
-        self._outlines = [_around(link.collision_shapes) for link in character.links]
+        outlines = [_around(link.collision_shapes) for link in character.links]
         self._around = [_around(own) for own in shapes]
-        self._rows = {link.name: row for row, link in enumerate(character.links)}
         self._centres = np.array([link.inertial_pose.position for link in character.links])
         self._frames = [
             scene.add_frame(f"{name}/links/{row}", show_axes=False) for row in range(len(shapes))
@@ -107,7 +98,7 @@ class DrawnCharacter:
                 bind(mesh, row)
         self._levels = [0] * len(shapes)
         self._vectors = _last_vectors(character)
-        self._add_marks(scene, name)
+        self.marks = CharacterMarks(scene, f"{name}/marks", character, outlines)
         self.origins: FloatArray = np.zeros((len(shapes), 3))
         self.turns_xyzw: FloatArray = np.tile((0.0, 0.0, 0.0, 1.0), (len(shapes), 1))
         self.shows: Mapping[str, bool] = dict.fromkeys(SHOWN, True)
@@ -138,33 +129,6 @@ class DrawnCharacter:
             for number, mesh in enumerate(meshes):
                 mesh.visible = shown == (number >= count)
 
-    def _add_marks(self, scene: viser.SceneApi, name: str) -> None:
-        """Add what is seen beside the links: centre of mass, support polygon, arrows.
-
-        All are below a frame that goes along with the root: a page changes the points of lines and
-        arrows later than the places of frames.
-        """
-        self.marks = name = f"{name}/marks"
-        self._marks = scene.add_frame(name, show_axes=False)
-        self._marked: FloatArray = np.zeros(3)  # where that frame is, m, world
-        self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
-        self._below = scene.add_icosphere(f"{name}/below", 0.02, color=_CENTRE, visible=False)
-        self._arrows = {
-            what: scene.add_arrows(
-                f"{name}/{what}", np.zeros((1, 2, 3)), color, shaft_radius=0.012,
-                head_radius=0.03, head_length=0.06, visible=False,
-            )
-            for what, color in (("contacts", _CONTACT), ("pushes", _PUSH))
-        }  # fmt: skip
-        self._support = scene.add_line_segments(
-            f"{name}/support",
-            np.zeros((1, 2, 3)),
-            _SUPPORT,
-            thickness=3.0,
-            thickness_units="screen",
-            visible=False,
-        )
-
     def _add(self, name: str, shape: Shape, *, ghost: bool = False) -> viser.MeshHandle:
         vertices, _, faces = surface_of(shape)
         red, green, blue, alpha = shape.color_rgba
@@ -187,6 +151,10 @@ class DrawnCharacter:
         """Where the base link is (3,), m, world."""
         root: FloatArray = self.origins[0]
         return root
+
+    @property
+    def _links(self) -> LinkPoses:
+        return LinkPoses(self.origins, self.turns_xyzw)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """The least and the greatest corner (3,) of a box around all its shapes, m, world.
@@ -225,12 +193,8 @@ class DrawnCharacter:
         if self._skin is not None:
             self._show_skin(shown=self.shows["skin"])
             self._skin.bend(self.origins, self.turns_xyzw)
-        self._marked = np.append(self.origins[0, :2], 0.0)
-        set_poses([self._marks], self._marked[np.newaxis], np.array([[0.0, 0.0, 0.0, 1.0]]))
         self._color(sample.state.effort)
-        self._draw_balance(sample.contacts)
-        self._draw_arrows("contacts", sample.contacts)
-        self._draw_arrows("pushes", sample.pushes)
+        self.marks.draw(sample, self._links, self._model, self.shows)
 
     def _draw_ghost(self, position: FloatArray | None) -> None:
         """Draw the reference at a position (n,); None: there is none."""
@@ -263,51 +227,9 @@ class DrawnCharacter:
             for mesh, color in zip(self._meshes[row], self._colors[row], strict=True):
                 mesh.color = _rgb(color + (_STRAIN_COLOR - color) * (level / _LEVELS))
 
-    def _draw_balance(self, contacts: WrenchArrays | None) -> None:
-        """Draw the centre of mass, the point below it, and the support polygon."""
-        shown = self.shows["balance"] and self.character.layout.has_floating_base
-        self._centre.visible = self._below.visible = shown
-        corners = np.empty((0, 2))
-        if shown:
-            centre = self._model.centre_of_mass() - self._marked
-            self._centre.position = centre
-            self._below.position = (*centre[:2], _ABOVE_GROUND)
-            links = contacts.links if contacts is not None else ()
-            rows = [self._rows[link] for link in links if link in self._rows]
-            corners = support_polygon(
-                [self._outlines[row] for row in rows], self.origins[rows], self.turns_xyzw[rows]
-            )
-        self._support.visible = len(corners) > 1
-        if len(corners) > 1:
-            corners -= self._marked[:2]
-            ring = np.column_stack((corners, np.full(len(corners), _ABOVE_GROUND)))
-            self._support.points = np.stack((ring, np.roll(ring, -1, axis=0)), axis=1)
-
-    def _draw_arrows(self, what: str, wrenches: WrenchArrays | None) -> None:
-        """Draw forces: those of contacts from where they act, pushes to where they act."""
-        arrows = []
-        if wrenches is not None and self.shows["forces"]:
-            for number, link in enumerate(wrenches.links):
-                row = self._rows.get(link)
-                force = wrenches.wrenches[number, :3] / (self.character.mass * _GRAVITY)
-                size = float(np.linalg.norm(force))
-                if row is None or size < _MIN_ARROW_SHARE:
-                    continue
-                points = wrenches.points
-                at = self.point(row, points[number] if len(points) else self._centres[row])
-                along = force * min(_METRES_A_WEIGHT, _MAX_ARROW_LENGTH / size)
-                arrows.append((at, at + along) if what == "contacts" else (at - along, at))
-        handle = self._arrows[what]
-        handle.visible = bool(arrows)
-        if arrows:
-            handle.points = np.array(
-                [(tail - self._marked, tip - self._marked) for tail, tip in arrows]
-            )
-
     def point(self, row: int, local: FloatArray) -> FloatArray:
         """A point (3,) of a link, m in its frame, in the world."""
-        place: FloatArray = self.origins[row] + rotations.rotate(self.turns_xyzw[row], local)
-        return place
+        return self._links.point(row, local)
 
     def local(self, row: int, point: FloatArray) -> FloatArray:
         """A point (3,) of the world in a link's frame, m."""

@@ -41,7 +41,7 @@ class LiveCharacter(DrawnCharacter):
             can_fall = _weighs(rebuilt)
             reader = reader_for(rebuilt.character, rebuilt.world.terrain) if can_fall else None
             of_many = len(rebuilt.world.characters) > _FEW
-            self._tag = NameTag(scene, self.marks, rebuilt.world.name, reader, of_many=of_many)
+            self._tag = NameTag(scene, self.marks.name, rebuilt.world.name, reader, of_many=of_many)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """The corners (3,) of a box around it, m, world, with room for what stands above it."""
