@@ -8,12 +8,14 @@ from itertools import chain
 import numpy as np
 
 from actuated_characters.bags.recording import Recording, Wrenches
+from actuated_characters.bags.thrown_balls import ThrownBall, thrown_balls
 from actuated_characters.render.engine.posed_characters import LinkForce
 from actuated_characters.render.engine.renderer import FrameSpec
 from actuated_characters.render.pushed_stills import Ticks
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.messages.projectiles import ball_names
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
@@ -133,8 +135,13 @@ class RecordedScene:
     def ball_radii(self, row: int, count: int) -> list[float]:
         """Radii of the balls that are there in a state, m, so many of them."""
         first = int(self.episode_rows[np.searchsorted(self.episode_rows, row, side="right") - 1])
-        thrown = [throw for each in self.recordings[0].throws[first:row] for throw in each]
-        return ([throw.radius for throw in thrown] + [_RADIUS] * count)[:count]
+        radii = {each.name: each.throw.radius for each in self._thrown.get(first, ())}
+        return [radii.get(name, _RADIUS) for name in ball_names(count)]
+
+    @cached_property
+    def _thrown(self) -> dict[int, tuple[ThrownBall, ...]]:
+        """The balls whose throws were recorded, by the first row of their episode."""
+        return thrown_balls(self.recordings[0])
 
     def _touching(self, begin: int, end: int) -> BoolArray:
         """Which links (l,) touched something in ticks from one to before another."""

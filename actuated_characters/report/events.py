@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.bags.thrown_balls import thrown_balls
 from actuated_characters.metrics.recording_metrics import push_spans
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
@@ -75,18 +76,15 @@ def mode_events(recording: Recording) -> list[Event]:
 
 def throw_events(recording: Recording) -> list[Event]:
     """The balls in the order in which they were thrown; each episode's first is `ball_1`."""
-    begins, events, count = set(recording.episode_rows.tolist()), list[Event](), 0
-    for tick, throws in enumerate(recording.throws):
-        count = 0 if tick in begins else count
-        for throw in throws:
-            count += 1
-            speed = float(np.linalg.norm(throw.velocity))
-            text = (
-                f"ball_{count} thrown: {throw.mass:.4g} kg, radius {throw.radius:.3g} m, "
-                f"{speed:.4g} m/s"
-            )
-            facts = {"mass": throw.mass, "radius": throw.radius, "speed": speed}
-            events.append(Event(THROW, float(recording.times[tick]), text=text, facts=facts))
+    events, times = list[Event](), recording.times
+    for ball in chain(*thrown_balls(recording).values()):
+        throw = ball.throw
+        speed = float(np.linalg.norm(throw.velocity))
+        text = (
+            f"{ball.name} thrown: {throw.mass:.4g} kg, radius {throw.radius:.3g} m, {speed:.4g} m/s"
+        )
+        facts = {"mass": throw.mass, "radius": throw.radius, "speed": speed}
+        events.append(Event(THROW, float(times[ball.tick]), text=text, facts=facts))
     return events
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from actuated_characters.bags.recording import Recording
+from actuated_characters.bags.thrown_balls import thrown_balls
 from actuated_characters.metrics.recording_metrics import gravities
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -35,7 +36,8 @@ def find_hits(recording: Recording) -> list[Hit]:
     """The hits by balls, in order; none without contacts or motion of balls.
 
     A ball has hit where its velocity changes by more than gravity does, and the contact force on a
-    link near it changes along with it: a ball on the ground moves no link.
+    link near it changes along with it: a ball on the ground moves no link. Nothing is told of balls
+    whose mass and radius are not known, because they were thrown before the first state.
     """
     if not recording.contacts or not recording.balls:
         return []
@@ -65,22 +67,25 @@ class _Struck:
 
 
 def _struck(recording: Recording, step: float) -> Iterator[_Struck]:
-    """The balls on which something acts, tick by tick."""
+    """The balls of known throws on which something acts, tick by tick."""
     gravity, begins = gravities(recording), set(recording.episode_rows.tolist())
-    thrown: list[ProjectileThrow] = []  # of the episode, in their order, which is the balls'
+    thrown = {
+        begin: {each.name: each.throw for each in balls}
+        for begin, balls in thrown_balls(recording).items()
+    }
+    throws: dict[str, ProjectileThrow] = {}  # of the episode
     for tick, (before, after) in enumerate(pairwise(recording.balls)):
-        thrown = [] if tick in begins else thrown
-        thrown += recording.throws[tick] if recording.throws else ()
+        throws = thrown.get(tick, throws)
         if before is None or after is None or tick + 1 in begins:
             continue
-        count = min(len(before.names), len(after.names), len(thrown))
+        count = min(len(before.names), len(after.names))
         change = after.motion[:count, 7:10] - before.motion[:count, 7:10]
         change[:, 2] += np.nan_to_num(gravity[tick]) * step
         for number in np.flatnonzero(np.linalg.norm(change, axis=1) > _LEAST_CHANGE).tolist():
-            throw, centre = thrown[number], after.motion[number, :3]
-            yield _Struck(
-                tick, after.names[number], centre, throw.radius, throw.mass * change[number]
-            )
+            name, centre = after.names[number], after.motion[number, :3]
+            throw = throws.get(name)
+            if throw is not None:
+                yield _Struck(tick, name, centre, throw.radius, throw.mass * change[number])
 
 
 def _pushed_link(

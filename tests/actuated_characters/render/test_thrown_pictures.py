@@ -78,6 +78,23 @@ def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recordi
     ]
 
 
+def test_where_a_bag_begins_with_balls_the_throws_in_it_are_those_of_later_ones(
+    recording: Recording,
+) -> None:
+    part = replace(recording.rows(slice(4, 6)), throws=((OTHER,),))
+
+    radii = make_scene([part]).ball_radii(1, 2)
+
+    assert radii == [0.1, 0.2]  # by default, and as it was thrown
+    assert [event.text.split()[0] for event in throw_events(part)] == ["ball_2"]
+
+
+def test_balls_that_are_told_of_late_are_those_that_were_thrown(recording: Recording) -> None:
+    late = replace(recording, balls=(*[None] * 5, recording.balls[5]))
+
+    assert make_scene([late]).ball_radii(5, 2) == [0.2, 0.1]
+
+
 @pytest.mark.parametrize("ground", [False, True])
 def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
     camera = Renderer(HUMANOID, ground=ground)

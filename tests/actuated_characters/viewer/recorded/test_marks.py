@@ -18,10 +18,10 @@ from msgs_config.messages.throw import ProjectileThrow
 from tests.support.runs import run_plan_here
 
 STEP_NS = NANOSECONDS_PER_SECOND // 240
-AT = 96  # the tick in which the balls begin, so that their first states are of 0.4 s
-# One strikes the trunk hard after a metre; one falls on the ground, and rolls away from the body.
+EARLIER, AT = 84, 96  # ticks in which the balls begin, so that one's first state is of 0.4 s
+# One falls on the ground, and rolls away from the body; one strikes the trunk hard after a metre.
+ROLLS = ProjectileThrow(3.0, 0.2, (0.0, 2.0, 0.3), (0.0, 1.0, 0.0))
 HITS = ProjectileThrow(6.0, 0.1, (-1.0, 0.0, 1.1), (10.0, 0.0, 0.0))
-ROLLS = ProjectileThrow(3.0, 0.1, (0.0, 2.0, 0.3), (0.0, 1.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,8 @@ def stands(tmp_path_factory: pytest.TempPathFactory) -> Path:
     simulator = {"wrench_duration": 0.1, "keyframe_period": 0.25}
     controller = {"root_assistance": True, "keyframe_period": 0.25, "behaviour": "active_ragdoll"}
     plan = make_plan("humanoid", 1.0, {"reference": "hold"}, simulator, controller)
-    throws = [PlannedThrow((AT + 1) * STEP_NS, each) for each in (HITS, ROLLS)]
+    balls = ((EARLIER, ROLLS), (AT, HITS))
+    throws = [PlannedThrow((tick + 1) * STEP_NS, each) for tick, each in balls]
     pushes = [parse_push("root:0,60,0@0.2", plan)]
     run_plan_here(plan, directory, pushes=pushes, throws=throws)
     return directory
@@ -47,7 +48,7 @@ def test_marks_say_when_something_happened(stands: Path) -> None:
     (push,) = of_kind(marks, "push")
     assert (push.start, push.end) == pytest.approx((0.2, 0.3))
     assert push.text == "push on root for 0.1 s: up to 60 N, 6 N s"
-    assert [mark.start for mark in of_kind(marks, "throw")] == pytest.approx([0.4, 0.4], abs=0.005)
+    assert [mark.start for mark in of_kind(marks, "throw")] == pytest.approx([0.35, 0.4], abs=0.005)
     keyframes = [mark.start for mark in of_kind(marks, "keyframe")]
     assert keyframes == pytest.approx([0.5, 0.75, 1.0])  # there is none while a push acts
     (end,) = of_kind(marks, "end")
@@ -77,11 +78,34 @@ def test_a_ball_hits_when_simulating_it_without_the_character_says_so(stands: Pa
     words = describe_hits(plan, throws, read_states(stands))
 
     hits = find_hits(recording)
-    assert {each.ball for each in hits} == {"ball_1"}
+    assert {each.ball for each in hits} == {"ball_2"}
     hit = hits[0]
-    assert words == [f"hit '{hit.link}' at {hit.time:.3f} s", "missed"]
+    assert words == ["missed", f"hit '{hit.link}' at {hit.time:.3f} s"]
     # it loses its speed, and at most comes back with it
     assert 0.3 * 60.0 < hit.impulse < 2.0 * 60.0
+
+
+def test_a_ball_that_was_thrown_before_the_bag_began_takes_no_other_balls_throw(
+    stands: Path,
+) -> None:
+    whole = read_recording(stands)
+    (hit, *_) = find_hits(whole)
+    first = AT - 6  # one ball flies
+    part = whole.rows(slice(first, len(whole.stamps_ns)))
+    assert part.balls[0] is not None and part.balls[0].names == ("ball_1",)
+
+    (found, *_) = find_hits(part)
+
+    assert (found.ball, found.link, found.impulse) == (hit.ball, hit.link, hit.impulse)
+    assert found.time == pytest.approx(hit.time - first / 240.0)
+
+
+def test_nothing_is_told_of_a_ball_whose_throw_is_not_in_the_bag(stands: Path) -> None:
+    whole = read_recording(stands)
+    part = whole.rows(slice(AT + 4, len(whole.stamps_ns)))  # both fly
+    assert part.balls[0] is not None and len(part.balls[0].names) == 2
+
+    assert find_hits(part) == []
 
 
 def test_one_keyframe_is_no_place_to_choose(tmp_path: Path) -> None:
