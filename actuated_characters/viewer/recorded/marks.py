@@ -80,6 +80,6 @@ def _keyframes(run: RecordedRun) -> list[Mark]:
     stamps = [place.stamp_ns for place in (found.places if found is not None else ())]
     within = [stamp_ns for stamp_ns in stamps if first_ns <= stamp_ns <= last_ns]
     times = [(stamp_ns - first_ns) / NANOSECONDS_PER_SECOND for stamp_ns in within]
-    if len(times) < 2:
+    if not any(time > 0.0 for time in times):
         return []
     return [Mark(KEYFRAME, time, time, "keyframe: a fork begins here") for time in times]

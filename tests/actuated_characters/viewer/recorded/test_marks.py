@@ -1,11 +1,13 @@
 """The marks of a recorded run's time line: when what happened, by other ways of knowing it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recording
+from actuated_characters.render.scene import make_scene
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from actuated_characters.runs.planned.throws import PlannedThrow
@@ -108,8 +110,14 @@ def test_nothing_is_told_of_a_ball_whose_throw_is_not_in_the_bag(stands: Path) -
     assert find_hits(part) == []
 
 
-def test_one_keyframe_is_no_place_to_choose(tmp_path: Path) -> None:
+def test_one_keyframe_is_a_place_to_choose_unless_it_is_the_first_state(tmp_path: Path) -> None:
     plan = make_plan("pendulum", 0.2, {"reference": "hold"}, {"keyframe_period": 0.15}, {})
     run_plan_here(plan, tmp_path / "short")
+    run = read_run(tmp_path / "short")
 
-    assert not of_kind(find_marks(read_run(tmp_path / "short")), "keyframe")
+    (mark,) = of_kind(find_marks(run), "keyframe")
+
+    assert mark.start == pytest.approx(0.15)
+    (recording,), row = run.recordings, round(0.15 * 240)
+    part = replace(run, scene=make_scene([recording.rows(slice(row, len(run.times)))]))
+    assert not of_kind(find_marks(part), "keyframe")
