@@ -135,20 +135,20 @@ class ServerGate:
             if "Accept-Encoding" in request.headers:  # what is zipped could not be added to
                 del request.headers["Accept-Encoding"]
             page = serve(connection, request)
-            return page if page is None else _with_head(page, _ADDED_SCRIPT + self._parts.head())
+            return page if page is None else self._with_head(page)
         except Exception as error:  # a request that viser does not understand ends no connection
             self.reject(f"rejected a request: {error!r}")
             return respond(HTTPStatus.BAD_REQUEST, "this request is not understood\n")
 
-
-def _with_head(response: Response, added: bytes) -> Response:
-    """A response, with more at the beginning of its head if it is a page."""
-    body = response.body.replace(b"<head>", b"<head>" + added, 1)
-    if body != response.body:
-        response.body = body
-        del response.headers["Content-Length"]
-        response.headers["Content-Length"] = str(len(body))
-    return response
+    def _with_head(self, response: Response) -> Response:
+        """A response, with more at the beginning of its head if it is a page."""
+        before, head, after = response.body.partition(b"<head>")
+        if head:
+            body = b"".join((before, head, _ADDED_SCRIPT, self._parts.head(), after))
+            response.body = body
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(body))
+        return response
 
 
 class _Told(logging.Handler):

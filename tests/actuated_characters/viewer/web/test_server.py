@@ -15,6 +15,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from actuated_characters.viewer.web import server as server_module
+from actuated_characters.viewer.web.page_parts import PageParts
 from actuated_characters.viewer.web.request_check import RequestCheck
 from actuated_characters.viewer.web.server import (
     ViewerServer,
@@ -125,6 +126,19 @@ def test_parts_of_our_own_are_served_with_the_page_and_to_no_page_from_elsewhere
     page = running.get("/", host).read()
     head = page.index(b"<head>"), page.index(b"</head>")
     assert head[0] < page.index("grüß dich".encode()) < head[1]
+
+
+def test_parts_of_the_page_are_read_for_the_page_alone(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[PageParts] = []
+    monkeypatch.setattr(PageParts, "head", lambda parts: read.append(parts) or b"")
+    host = f"localhost:{running.port}"
+
+    assert running.get("/missing", host).status == HTTPStatus.NOT_FOUND
+    assert not read
+    assert running.get("/", host).status == HTTPStatus.OK
+    assert read == [running.server.parts]
 
 
 @pytest.mark.parametrize("path", ["/", "/missing", "/?websocket=ws://evil.example"])
