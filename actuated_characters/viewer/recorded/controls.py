@@ -11,9 +11,9 @@ from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from actuated_characters.viewer.parameters import SHOWN
 from actuated_characters.viewer.recorded.fork_controls import CANCEL, ForkControls, ForkTarget
+from actuated_characters.viewer.recorded.ghosts import NO_GHOST, REFERENCE
 from actuated_characters.viewer.recorded.timeline import Playback
 
-NO_GHOST, REFERENCE = "none", "reference"
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 _PLAY, _PAUSE, _BACK, _NEXT, _START, _END = "Play", "Pause", "-1", "+1", "Start", "End"
 _PNG, _MP4 = "PNG", "MP4"
@@ -49,7 +49,7 @@ class RecordedPanel:
         """`by_arrow`: arrows can be drawn on the body, for forks."""
         self._gui, self._scene, self._timeline = gui, scene, timeline
         self._actions, self._shown = actions, shown
-        self.shows = {**dict.fromkeys(SHOWN, True), "reference": True}
+        self.shows = dict.fromkeys(SHOWN, True)
         self.is_cancelled = False
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")

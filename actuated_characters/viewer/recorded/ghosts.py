@@ -2,10 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain, count
 
 from actuated_characters.viewer.recorded.marks import Mark, find_marks
 from actuated_characters.viewer.recorded.plots import RunCurves, run_curves
 from actuated_characters.viewer.recorded.run import RecordedRun, beside
+
+NO_GHOST, REFERENCE = "none", "reference"
+"""What is chosen where no run is the ghost."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,18 @@ class Ghosts:
             RecordingError: it has other characters.
             ActuatedCharactersError: its bag cannot be read.
         """
-        name = other.name if other.name != self._run.name else str(other.path)
+        name = self._free_name(other)
         run = beside(self._run, other)
         self._ghosts[name] = Ghost(name, run, find_marks(run), run_curves(run, name))
         return self._ghosts[name]
+
+    def _free_name(self, other: RecordedRun) -> str:
+        """The name of a run's directory, or its path where something else is called so."""
+        taken = {self._run.name, NO_GHOST, REFERENCE, *self._ghosts}
+        path = str(other.path.resolve())
+        numbered = (f"{path} ({number})" for number in count(2))
+        names = chain((other.name, str(other.path), path), numbered)
+        return next(name for name in names if name not in taken)
 
     def get(self, name: str) -> Ghost | None:
         """The ghost of a name; None if there is none."""

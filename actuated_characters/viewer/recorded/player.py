@@ -10,7 +10,7 @@ from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter, bind_nothing
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
-from actuated_characters.viewer.recorded.controls import REFERENCE, RecordedPanel
+from actuated_characters.viewer.recorded.controls import RecordedPanel
 from actuated_characters.viewer.recorded.export import (
     FPS,
     CancelledError,
@@ -19,7 +19,7 @@ from actuated_characters.viewer.recorded.export import (
     save_picture,
 )
 from actuated_characters.viewer.recorded.forking import Fork
-from actuated_characters.viewer.recorded.ghosts import Ghosts
+from actuated_characters.viewer.recorded.ghosts import REFERENCE, Ghosts
 from actuated_characters.viewer.recorded.marks import find_marks
 from actuated_characters.viewer.recorded.plots import Plots, run_curves
 from actuated_characters.viewer.recorded.push_arrow import DrawnPush, PushArrow
