@@ -38,6 +38,8 @@ class ForkControls:
         """`cancel` ends the fork that is being made; it is called in the server's thread."""
         self._gui, self._actions, self._target, self._cancel = gui, actions, target, cancel
         self._drawn = ""  # what the arrow says
+        self._stands = self._is_let_go = False  # the arrow
+        self._is_forking = False
         self._offered = gui.add_markdown("", visible=False)
         self._offer: Any = gui.add_button_group("This push", (FORK_HERE, DISCARD), visible=False)
         self._ending: Any = gui.add_button_group("Forking", (CANCEL,), visible=False)
@@ -92,7 +94,8 @@ class ForkControls:
     def show_push(self, push: DrawnPush | None, duration: float, *, let_go: bool) -> None:
         """Have the folder say what an arrow says, and offer a fork once it is let go.
 
-        None: there is no arrow any more. A push acts for a `duration` in s.
+        None: there is no arrow any more. A push acts for a `duration` in s. While a fork is made
+        none is offered, nor begun at once.
         """
         if push is not None:
             self._push.value = self._drawn = push.text
@@ -100,13 +103,19 @@ class ForkControls:
             self._offered.content = as_text(text)
         elif self._push.value == self._drawn:  # and nothing else was typed
             self._push.value = ""
-        self._offered.visible = push is not None
-        self._offer.visible = push is not None and let_go
-        if push is not None and let_go and self._at_once.value:
+        self._stands = push is not None
+        self._is_let_go = self._stands and let_go
+        self._show_offers()
+        if self._offer.visible and self._at_once.value:
             self._fork()
 
     def show_forking(self, *, goes_on: bool) -> None:
         """Offer to cancel a fork while it is being made, and no further one."""
-        self._ending.visible = goes_on
-        if goes_on:
-            self._offer.visible = False
+        self._is_forking = goes_on
+        self._show_offers()
+
+    def _show_offers(self) -> None:
+        """Show what can be done with the arrow, and with the fork that is being made."""
+        self._offered.visible = self._stands
+        self._offer.visible = self._is_let_go and not self._is_forking
+        self._ending.visible = self._is_forking

@@ -62,7 +62,7 @@ class PushArrow:
         self._drawn: DrawnCharacter | None = None
         self._push: DrawnPush | None = None
         self._row = 0  # of the state in which it was drawn
-        self._client: int | None = None  # whose drag it is, until it is let go
+        self._client: int | None = None  # who has begun the last drag, until it is let go
         self._nodes: tuple[viser.ArrowsHandle, viser.LabelHandle] | None = None
 
     def draw_on(self, drawn: DrawnCharacter) -> None:
@@ -90,7 +90,7 @@ class PushArrow:
             timeline.plays = False
             self._row = timeline.row
         elif self._client != event.client_id or self._row != timeline.row:
-            return  # another page draws one, or has gone to another time
+            return  # another page has begun one since, or has gone to another time
         self._client = None if is_end else event.client_id
         centre = self._drawn.centre_of(row)
         pointer = np.array(event.end_position) + self._scene.offset

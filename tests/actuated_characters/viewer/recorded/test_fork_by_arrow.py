@@ -126,6 +126,9 @@ def check_that_a_fork_can_be_cancelled(browser: Browser, walk: Path) -> None:
     wait_until(lambda: "the fork is cancelled" in text_of(browser), "its end", SOON)
     assert not (walk.with_name("walk-fork") / "summary.json").exists()
     wait_until(lambda: "Forking" not in text_of(browser), "nothing to be cancelled", SOON)
+    wait_until(lambda: "Fork from here" in text_of(browser), "the offer for the arrow", SOON)
+    wait_until(lambda: browser.click("Discard"), "the button", SOON)
+    wait_until(lambda: "Fork from here" not in text_of(browser), "no arrow any more", SOON)
 
 
 def check_that_the_fork_at_once_has_the_push_of_the_arrow(browser: Browser, walk: Path) -> None:
