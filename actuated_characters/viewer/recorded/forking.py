@@ -19,6 +19,7 @@ class Fork:
 
     def __init__(self, run: Path, time: float, push: str, settings: Sequence[str]) -> None:
         """Begin: from a time, s, with a push `LINK:FX,FY,FZ` there, and parameters."""
+        self.time = time
         run = run.absolute()
         run = run.parent if run.name == BAG else run
         self.directory = free_path(run.parent, f"{run.name}-fork", "")

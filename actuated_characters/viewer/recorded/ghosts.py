@@ -34,8 +34,8 @@ class Ghosts:
         """Those of all ghosts."""
         return list(self._ghosts)
 
-    def add(self, other: RecordedRun) -> Ghost:
-        """Add a run.
+    def make(self, other: RecordedRun) -> Ghost:
+        """Make a ghost of a run, which takes its time; for any thread.
 
         Raises:
             RecordingError: it has other characters.
@@ -43,8 +43,11 @@ class Ghosts:
         """
         name = self._free_name(other)
         run = beside(self._run, other)
-        self._ghosts[name] = Ghost(name, run, find_marks(run), run_curves(run, name))
-        return self._ghosts[name]
+        return Ghost(name, run, find_marks(run), run_curves(run, name))
+
+    def add(self, ghost: Ghost) -> None:
+        """Add one of those that were made."""
+        self._ghosts[ghost.name] = ghost
 
     def _free_name(self, other: RecordedRun) -> str:
         """The name of a run's directory, or its path where something else is called so."""

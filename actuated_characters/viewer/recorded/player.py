@@ -1,7 +1,10 @@
 """Shows a recorded run in a browser: no node, for nothing of it is on topics."""
 
+import threading
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 
 import viser
@@ -19,7 +22,7 @@ from actuated_characters.viewer.recorded.export import (
     save_picture,
 )
 from actuated_characters.viewer.recorded.forking import Fork
-from actuated_characters.viewer.recorded.ghosts import REFERENCE, Ghosts
+from actuated_characters.viewer.recorded.ghosts import REFERENCE, Ghost, Ghosts
 from actuated_characters.viewer.recorded.marks import find_marks
 from actuated_characters.viewer.recorded.plots import Plots, run_curves
 from actuated_characters.viewer.recorded.push_arrow import DrawnPush, PushArrow
@@ -51,7 +54,7 @@ class RecordedPlayer:
         self._server, self._run = server, run
         self._ghosts = Ghosts(run)
         for other in others:
-            self._ghosts.add(other)
+            self._ghosts.add(self._ghosts.make(other))
         self._timeline = Playback(run.times)
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
@@ -68,6 +71,7 @@ class RecordedPlayer:
         self._panel.character.visible = len(self._curves) > 1
         self._compared: tuple[str, str] | None = None  # the ghost and the character of the plots
         self._fork: Fork | None = None
+        self._read: Fork | None = None  # the last one that was looked at
         self._timeline.play()
         self._draw(0.0)
         self._scene.frame_characters(self._drawn)
@@ -226,28 +230,47 @@ class RecordedPlayer:
     def cancel(self) -> None:
         """End the fork that is being made."""
         if self._fork is not None:
-            self._fork.cancel()
-            self._fork = None
-            self._panel.forks.show_forking(goes_on=False)
-            self._tell("the fork is cancelled")
+            self._end_fork(self._fork, "the fork is cancelled")
 
     def _look_at_fork(self) -> None:
-        """Take the fork if it is done."""
+        """Have the fork read when it is done, in a thread of its own: the pages are drawn on."""
         fork = self._fork
-        if fork is None or not fork.has_ended:
+        if fork is None or fork is self._read or not fork.has_ended:
             return
+        self._read = fork
+        if fork.error:
+            self._end_fork(fork, fork.error)
+        else:
+            threading.Thread(target=self._read_fork, args=(fork,), daemon=True).start()
+
+    def _read_fork(self, fork: Fork) -> None:
+        found: Future[Ghost] = Future()
+        try:
+            found.set_result(self._ghosts.make(read_run(fork.directory)))
+        except BaseException as error:  # to be raised in the player's thread
+            found.set_exception(error)
+        self._actions.put(partial(self._take_fork, fork, found))
+
+    def _take_fork(self, fork: Fork, found: Future[Ghost]) -> None:
+        """Make a fork that was read the ghost, unless it was cancelled meanwhile."""
+        if fork is not self._fork:
+            return
+        try:
+            ghost = found.result()
+        except ActuatedCharactersError as error:
+            self._end_fork(fork, f"error: {error}")
+            return
+        self._ghosts.add(ghost)
+        self._panel.choose_ghosts(self._ghosts.names, ghost.name)
+        self._timeline.play_from(fork.time)
+        self._end_fork(fork, f"forked: {fork.directory}; the ghost")
+
+    def _end_fork(self, fork: Fork, sentence: str) -> None:
+        """No fork is being made any more; say why."""
+        fork.cancel()
         self._fork = None
         self._panel.forks.show_forking(goes_on=False)
-        reason = fork.error
-        try:
-            if not reason:
-                ghost = self._ghosts.add(read_run(fork.directory))
-                self._panel.choose_ghosts(self._ghosts.names, ghost.name)
-                self._timeline.play()
-        except ActuatedCharactersError as error:
-            reason = f"error: {error}"
-        fork.cancel()
-        self._tell(reason or f"forked: {fork.directory}; the ghost")
+        self._tell(sentence)
 
     def _tell(self, sentence: str) -> None:
         """Say something in the panel and in the terminal."""

@@ -49,6 +49,11 @@ class Playback:
             self._time = float(self.times[0])
         self.plays = True
 
+    def play_from(self, time: float) -> None:
+        """Play on from a time, s, also if nothing comes after it."""
+        self.seek(time)
+        self.plays = True
+
     def advance(self, seconds: float) -> None:
         """Play for a wall time in s: at the end it stands, or begins again."""
         if not self.plays:

@@ -20,7 +20,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
 def names_of(run: RecordedRun, *paths: str) -> list[str]:
     """The names of ghosts in the directories of these paths."""
     ghosts, here = Ghosts(run), run.scene
-    added = [ghosts.add(RecordedRun(Path(path), here)) for path in paths]
+    added = []
+    for path in paths:
+        added.append(ghosts.make(RecordedRun(Path(path), here)))
+        ghosts.add(added[-1])
     assert all(ghosts.get(each.name) is each for each in added)
     assert [each.name for each in added] == ghosts.names
     for each in added:

@@ -55,6 +55,18 @@ def test_it_stands_until_it_is_played_and_at_its_end() -> None:
     assert (timeline.row, timeline.plays) == (0, True)
 
 
+def test_it_plays_on_from_a_time_also_from_the_end() -> None:
+    timeline = Playback(TIMES)
+    timeline.play_from(0.5)
+    timeline.advance(0.25)
+    assert (timeline.row, timeline.plays) == (180, True)
+
+    timeline.play_from(1.0)
+    assert (timeline.row, timeline.plays) == (240, True)
+    timeline.advance(0.01)
+    assert (timeline.row, timeline.plays) == (240, False)
+
+
 def test_a_loop_begins_again_where_the_time_is() -> None:
     timeline = playing(loops=True)
     timeline.advance(2.25)
