@@ -98,9 +98,9 @@ class RecordedPanel:
         elif button == _PAUSE:
             timeline.plays = False
         elif button == _START:
-            timeline.seek(float(timeline.times[0]))
+            self._seek(float(timeline.times[0]))
         elif button == _END:
-            timeline.seek(timeline.end)
+            self._seek(timeline.end)
         else:
             timeline.step(-1 if button == _BACK else 1)
 

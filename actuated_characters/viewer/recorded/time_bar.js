@@ -55,7 +55,9 @@
   async function fetchMarks(version) {
     asked = version;
     const found = await fetch(ADDRESS).then(response => response.json()).catch(() => null);
+    if (version !== asked) return; // a newer one was asked for meanwhile
     if (!found?.slider) { setTimeout(() => { asked = -1; }, 1000); return; }
+    if (found.version !== asked) return; // the page will be told of it, and ask again
     told = found;
     track.querySelectorAll("[data-made]").forEach(each => each.remove());
     const ghost = told.ghost && `${told.ghost}: `;
@@ -107,7 +109,7 @@
     }
   };
   track.onpointerup = event => { if (drags && sentAt) seek(timeOf(event)); drags = false; sentAt = 0; };
-  track.onpointercancel = () => { drags = false; };
+  track.onpointercancel = () => { drags = false; sentAt = 0; };
   track.onpointerleave = () => { tip.style.display = "none"; };
   play.onclick = () => press(plays ? "Pause" : "Play");
 

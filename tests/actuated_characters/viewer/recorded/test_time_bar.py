@@ -180,6 +180,61 @@ def check_that_a_reload_and_another_page_show_the_same(browser: Browser, viewer:
     until_at(browser, "0.000")
 
 
+NEVER_CAPTURED = """(() => {  // a made pointer cannot be captured
+    const track = document.querySelector("#time-line .track");
+    track.setPointerCapture = () => {};
+    window.point = (kind, x) => track.dispatchEvent(new PointerEvent(kind, {clientX: x}));
+})()"""
+
+
+def test_a_drag_that_is_cancelled_leaves_the_next_click_its_mark(
+    viewer: Process, browser: Browser
+) -> None:
+    open_bar(browser, viewer)
+    until_at(browser, "1.000")
+    browser.evaluate(NEVER_CAPTURED)
+    x, _ = place_of(browser, ".push")
+    for kind, at in (("down", x - 200), ("move", x - 150), ("cancel", x - 150)):
+        browser.evaluate(f"point('pointer{kind}', {at})")
+    wait_until(lambda: seconds_of(browser) < 0.45, "the drag", SOON)
+
+    browser.evaluate(f"point('pointerdown', {x}), point('pointerup', {x})")
+
+    until_at(browser, "0.500")
+    browser.evaluate("new Promise(done => setTimeout(done, 500))")
+    assert row_of(browser) == 120
+
+
+# Two answers to what the page asks for, of which the first one comes last.
+ANSWERS = """(async () => {
+    const told = await (await fetch("/time_line.json")).json();
+    const position = window.__viserMutable.nodePoseData["/time_line"].position;
+    const answers = [];
+    window.fetch = () => new Promise(done => answers.push(done));
+    const turn = () => new Promise(done => setTimeout(done, 10));
+    for (const later of [1, 2]) {
+        position[2] = 2 * (told.version + later);
+        while (answers.length < later) await turn();
+    }
+    const answer = (number, text) => answers[number]({json: async () => ({
+        ...told, version: told.version + 1 + number,
+        marks: [{...told.marks[0], kind: "push", text}],
+    })});
+    answer(1, "the newer one");
+    await turn();
+    answer(0, "the older one");
+    await turn();
+    return document.querySelector("#time-line .push").ariaLabel;
+})()"""
+
+
+def test_marks_that_come_late_replace_no_newer_ones(viewer: Process, browser: Browser) -> None:
+    open_bar(browser, viewer)
+    until_at(browser, "1.000")
+
+    assert browser.evaluate(ANSWERS).endswith("the newer one")
+
+
 def test_without_a_recorded_run_the_page_has_no_time_line(
     processes: Processes, browser: Browser
 ) -> None:
