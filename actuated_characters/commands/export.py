@@ -194,9 +194,14 @@ def _write_motion(options: argparse.Namespace, kind: str) -> None:
         )
     total = len(times) * len(motion.characters)
     with progress_bar(options.output.name, total, "frames", transient=True) as bar:
-        content = (_bvh if kind == _BVH else _gltf)(
-            options, motion, times, lambda done: bar.update(bar.task_ids[0], completed=done), skin
-        )
+
+        def progress(done: int) -> None:
+            bar.update(bar.task_ids[0], completed=done)
+
+        if kind == _BVH:
+            content = _bvh(options, motion, times, progress)
+        else:
+            content = _gltf(options, motion, times, progress, skin)
     write_whole(options.output, content)
     print(
         f"{options.output}: {', '.join(names)}, {len(times)} frames over "
@@ -230,9 +235,7 @@ def _bvh(
     motion: "Trajectories",
     times: "FloatArray",
     progress: Callable[[int], None],
-    skin: "GivenSkin | None",
 ) -> bytes:
-    del skin
     from character_motion.bvh.writing import bvh_text
     from character_motion.export.bvh_motion import to_bvh
 

@@ -6,8 +6,10 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_COMPONENTS = {"<f4": 5126, "<u4": 5125, "<u2": 5123, "|u1": 5121}
+from character_motion.gltf.kinds import COMPONENTS, WIDTHS
+
+_TYPES = {width: name for name, width in WIDTHS.items()}
+_CODES = {component: code for code, component in COMPONENTS.items()}
 _ALIGNMENT = 4
 
 VERTICES, INDICES = 34962, 34963
@@ -66,7 +68,7 @@ class NumberBuffer:
         stored = np.ascontiguousarray(rows, dtype=component)
         accessor: dict[str, Any] = {
             "bufferView": self.add_view(stored.tobytes(), target),
-            "componentType": _COMPONENTS[component],
+            "componentType": _CODES[component],
             "count": len(stored),
             "type": _TYPES[stored.shape[1]],
         }

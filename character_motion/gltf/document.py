@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from character_motion.gltf.buffer import INDICES, VERTICES, NumberBuffer
+from character_motion.gltf.gamma import without_gamma
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.model import Quadruple
 from msgs_config.geometry.surface import Surface
@@ -116,7 +117,7 @@ class GltfDocument:
         if uvs is not None:
             attributes["TEXCOORD_0"] = add(uvs, VERTICES)
         if colors is not None:
-            attributes["COLOR_0"] = add(_without_gamma(colors), VERTICES)
+            attributes["COLOR_0"] = add(without_gamma(colors), VERTICES)
         return attributes
 
     def bind(self, joints: IntArray, weights: FloatArray) -> Attributes:
@@ -175,7 +176,7 @@ class GltfDocument:
     def material(self, color_rgba: Quadruple) -> int:
         """The number of the material of a colour, 0 to 1, with the gamma of sRGB."""
         if color_rgba not in self._materials:
-            factor = [*_without_gamma(np.array(color_rgba[:3])).tolist(), color_rgba[3]]
+            factor = [*without_gamma(np.array(color_rgba[:3])).tolist(), color_rgba[3]]
             material = _surface({"baseColorFactor": factor})
             if color_rgba[3] < 1.0:
                 material["alphaMode"] = "BLEND"
@@ -235,9 +236,3 @@ class GltfDocument:
 def _surface(color: dict[str, Any]) -> dict[str, Any]:
     """A material of a colour, or a texture, which is no metal."""
     return {"pbrMetallicRoughness": {**color, "metallicFactor": 0.0, "roughnessFactor": _ROUGHNESS}}
-
-
-def _without_gamma(levels: FloatArray) -> FloatArray:
-    """Parts of colours, 0 to 1, without the gamma of sRGB (IEC 61966-2-1): as glTF has them."""
-    levels = np.clip(levels, 0.0, 1.0)
-    return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)

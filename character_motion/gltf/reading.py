@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from character_motion.gltf.kinds import COMPONENTS, WIDTHS
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import SkinError
 from msgs_config.file_kinds import refuse_other_kind
@@ -22,15 +23,6 @@ _MAGIC, _JSON_CHUNK, _BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 _MOST_BYTES = 256 * 1024 * 1024
 _MOST_NODES = 16_384
 _MOST_ROWS = 2_000_000  # of an accessor
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_NUMBERS: dict[int, str] = {
-    5120: "i1",
-    5121: "u1",
-    5122: "<i2",
-    5123: "<u2",
-    5125: "<u4",
-    5126: "<f4",
-}
 _PARTS = ("nodes", "meshes", "skins", "accessors", "bufferViews", "buffers")
 _PARTS_OF_LOOKS = ("materials", "textures", "images")
 _KNOWN_EXTENSIONS = (
@@ -113,8 +105,8 @@ class GlbFile:
     def rows(self, number: int) -> NDArray[Any]:
         """The rows (m, width) of an accessor, as numbers of the kind that they are stored in."""
         accessor = self.entries("accessors")[_index(number)]
-        count, width = _index(accessor["count"]), _WIDTHS[accessor["type"]]
-        kind = np.dtype(_NUMBERS[accessor["componentType"]])
+        count, width = _index(accessor["count"]), WIDTHS[accessor["type"]]
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
         if count > _MOST_ROWS:
             raise SkinError(
                 f"{self.path}: accessor {number} has {count} rows; at most {_MOST_ROWS}"

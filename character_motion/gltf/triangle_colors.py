@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from character_motion.gltf.gamma import with_gamma, without_gamma
 from character_motion.gltf.reading import GlbFile
 from msgs_config.arrays import FloatArray, IntArray
 
@@ -31,13 +32,13 @@ def triangle_colors(file: GlbFile, primitive: dict[str, Any], triangles: IntArra
             picture = _picture(file, texture["index"])
             if uvs is not None and picture is not None:
                 middles = file.numbers(uvs)[triangles].mean(axis=1)
-                linear *= _to_linear(_sampled(picture, middles))
+                linear *= without_gamma(_sampled(picture, middles))
     elif "COLOR_0" not in attributes:
         return np.full((len(triangles), 3), _GREY)
     if "COLOR_0" in attributes:
         own = file.numbers(attributes["COLOR_0"])[:, :3]
         linear *= np.clip(own, 0.0, 1.0)[triangles].mean(axis=1)
-    return _to_srgb(linear)
+    return with_gamma(linear)
 
 
 def _picture(file: GlbFile, number: int) -> NDArray[np.uint8] | None:
@@ -65,15 +66,3 @@ def _sampled(picture: NDArray[np.uint8], uvs: FloatArray) -> FloatArray:
     columns = np.minimum((u * width).astype(np.intp), width - 1)
     texels: FloatArray = picture[rows, columns] / 255.0
     return texels
-
-
-def _to_linear(levels: FloatArray) -> FloatArray:
-    """Without sRGB's gamma (IEC 61966-2-1)."""
-    return np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
-
-
-def _to_srgb(levels: FloatArray) -> FloatArray:
-    """With it."""
-    return np.where(
-        levels <= 0.0031308, levels * 12.92, 1.055 * np.maximum(levels, 0.0) ** (1.0 / 2.4) - 0.055
-    )
