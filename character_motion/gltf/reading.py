@@ -7,6 +7,7 @@ A file is not trusted: what it says of its own sizes is compared with what is th
 
 import json
 import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,9 +93,13 @@ class GlbFile:
         found: list[dict[str, Any]] = self.content.get(part, [])
         return found
 
+    def entry(self, part: str, number: object) -> dict[str, Any]:
+        """The entry of a number; raises LookupError or ValueError if there is none."""
+        return self.entries(part)[_index(number)]
+
     def view(self, number: int) -> bytes:
         """The bytes of a view of the buffer."""
-        view = self.entries("bufferViews")[_index(number)]
+        view = self.entry("bufferViews", number)
         if _index(view.get("buffer", 0)) or "uri" in self.entries("buffers")[0]:
             raise SkinError(f"{self.path} has its numbers in other files; export it as one .glb")
         start, length = _index(view.get("byteOffset", 0)), _index(view["byteLength"])
@@ -102,9 +107,20 @@ class GlbFile:
             raise self.damaged(f"view {number} goes beyond the end of its numbers")
         return self.binary[start : start + length]
 
-    def rows(self, number: int) -> NDArray[Any]:
+    def _rows(
+        self, holder: Mapping[str, Any], name: str, kinds: Sequence[str]
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
         """The rows (m, width) of an accessor, as numbers of the kind that they are stored in."""
-        accessor = self.entries("accessors")[_index(number)]
+        number = holder[name]
+        accessor = self.entry("accessors", number)
+        if accessor["type"] not in kinds:
+            raise self.damaged(
+                f"{name} is {accessor['type']!s:.20}; it must be {' or '.join(kinds)}"
+            )
+        return self._content(number, accessor), accessor
+
+    def _content(self, number: int, accessor: dict[str, Any]) -> NDArray[Any]:
+        """The rows (m, width) of an accessor of a number."""
         count, width = _index(accessor["count"]), WIDTHS[accessor["type"]]
         kind = np.dtype(COMPONENTS[accessor["componentType"]])
         if count > _MOST_ROWS:
@@ -116,7 +132,7 @@ class GlbFile:
         if "bufferView" not in accessor:
             return np.zeros((count, width), dtype=kind)
         content = self.view(accessor["bufferView"])
-        view = self.entries("bufferViews")[_index(accessor["bufferView"])]
+        view = self.entry("bufferViews", accessor["bufferView"])
         stride = _index(view.get("byteStride", 0)) or width * kind.itemsize
         start = _index(accessor.get("byteOffset", 0))
         if count and start + (count - 1) * stride + width * kind.itemsize > len(content):
@@ -126,25 +142,30 @@ class GlbFile:
         )
         return rows
 
-    def numbers(self, number: int) -> FloatArray:
+    def numbers(self, holder: Mapping[str, Any], name: str, *kinds: str) -> FloatArray:
         """The rows (m, width) of an accessor as floats; integers that are shares, as such.
 
+        Args:
+            holder: What has its number, such as the attributes of a mesh.
+            name: By which name it has it.
+            kinds: The types, such as VEC3, of which one must be the accessor's.
+
         Raises:
-            SkinError: they are not there, or not finite.
+            SkinError: they are not there, of another type, or not finite.
         """
-        rows = self.rows(number)
+        rows, accessor = self._rows(holder, name, kinds)
         values = rows.astype(np.float64)
-        if self.entries("accessors")[number].get("normalized") and rows.dtype.kind in "iu":
+        if accessor.get("normalized") and rows.dtype.kind in "iu":
             values = np.maximum(values / np.iinfo(rows.dtype).max, -1.0)
         if not np.isfinite(values).all():
-            raise self.damaged(f"accessor {number} has numbers that are not finite")
+            raise self.damaged(f"{name} has numbers that are not finite")
         return values
 
-    def indices(self, number: int, below: int) -> IntArray:
+    def indices(self, holder: Mapping[str, Any], name: str, kind: str, below: int) -> IntArray:
         """The rows (m, width) of an accessor as numbers of things of which there are so many."""
-        rows = self.rows(number)
+        rows, _ = self._rows(holder, name, (kind,))
         if rows.dtype.kind != "u" or rows.max(initial=0) >= max(below, 1):
-            raise self.damaged(f"accessor {number} refers to what is not there")
+            raise self.damaged(f"{name} refers to what is not there")
         return rows.astype(np.intp)
 
 

@@ -15,6 +15,7 @@ from msgs_config.geometry.surface import Surface
 MOST_VERTICES, MOST_TRIANGLES, MOST_JOINTS = 200_000, 400_000, 1024
 _TRIANGLES = 4  # the mode of a primitive
 _DEEPEST = 512  # of nodes below each other
+_FARTHEST = 1e9  # of a vertex or a joint from the origin, in the file's unit of length
 _MOST_SETS = 4  # of four joints each, of a vertex
 
 
@@ -48,8 +49,10 @@ def read_skinned_mesh(file: GlbFile) -> SkinnedMesh:
     """
     with Holding(file), np.errstate(all="ignore"):
         mesh = _Reader(file).mesh()
-    if not all(np.isfinite(each).all() for each in (mesh.places, *mesh.surface[:2])):
-        raise file.damaged("its mesh or its joints are not at finite places")
+    if not all((np.abs(each) <= _FARTHEST).all() for each in (mesh.places, *mesh.surface[:2])):
+        raise file.damaged(f"its mesh or its joints are farther away than {_FARTHEST:g}")
+    if not np.isfinite(mesh.colors).all():
+        raise file.damaged("a colour of it is no number")
     return mesh
 
 
@@ -94,8 +97,8 @@ class _Reader:
 
     def _find_joints(self) -> list[int]:
         """The nodes that are joints of the skins in use, parents first."""
-        skins = self._file.entries("skins")
-        wanted = {int(j) for node in self._skinned for j in skins[node["skin"]]["joints"]}
+        skins = [self._file.entry("skins", node["skin"]) for node in self._skinned]
+        wanted = {int(joint) for skin in skins for joint in skin["joints"]}
         if not wanted or min(wanted) < 0 or max(wanted) >= len(self._nodes):
             raise self._file.damaged("a skin has joints that are not there")
         if len(wanted) > MOST_JOINTS:
@@ -128,11 +131,11 @@ class _Reader:
 
         The mesh is in the pose in which it was bound, with its first joint where the file has it.
         """
-        skin = self._file.entries("skins")[number]
+        skin = self._file.entry("skins", number)
         nodes = [int(each) for each in skin["joints"]]
         binds = np.tile(np.eye(4), (len(nodes), 1, 1))
         if "inverseBindMatrices" in skin:
-            given = self._file.numbers(skin["inverseBindMatrices"])
+            given = self._file.numbers(skin, "inverseBindMatrices", "MAT4")
             binds = given.reshape(-1, 4, 4).swapaxes(1, 2)[: len(nodes)]
         first = min(range(len(nodes)), key=lambda k: self._rows[nodes[k]])
         turn = self._world(nodes[first]) @ binds[first]
@@ -142,41 +145,47 @@ class _Reader:
         return np.array([self._rows[node] for node in nodes]), turn, places
 
     def _pieces(self, mesh: int, joints: IntArray, turn: FloatArray) -> Iterator[_Piece]:
-        for primitive in self._file.entries("meshes")[mesh]["primitives"]:
+        for primitive in self._file.entry("meshes", mesh)["primitives"]:
             if primitive.get("mode", _TRIANGLES) != _TRIANGLES:
                 continue  # points and lines, which are no surface
             yield self._piece(primitive, joints, turn)
 
     def _piece(self, primitive: dict[str, Any], joints: IntArray, turn: FloatArray) -> _Piece:
         file, attributes = self._file, primitive["attributes"]
-        places = file.numbers(attributes["POSITION"])
+        places = file.numbers(attributes, "POSITION", "VEC3")
         count = len(places)
         corners = np.arange(count)
         if "indices" in primitive:
-            corners = file.indices(primitive["indices"], count)[:, 0]
+            corners = file.indices(primitive, "indices", "SCALAR", count)[:, 0]
         triangles = corners.reshape(-1, 3)
         if np.linalg.det(turn[:3, :3]) < 0.0:
             triangles = triangles[:, ::-1]
         vertices = places @ turn[:3, :3].T + turn[:3, 3]
         normals = _normals(vertices, triangles)
         if "NORMAL" in attributes:
-            given = file.numbers(attributes["NORMAL"]) @ np.linalg.inv(turn[:3, :3])
+            given = file.numbers(attributes, "NORMAL", "VEC3") @ np.linalg.inv(turn[:3, :3])
             lengths = np.linalg.norm(given, axis=1, keepdims=True)
             normals = np.where(lengths > 0.0, given / np.maximum(lengths, 1e-300), normals)
-        names = [f"_{k}" for k in range(_MOST_SETS) if f"JOINTS_{k}" in attributes]
-        if not names:
-            raise SkinError(f"{file.path} has a mesh with a skin whose vertices follow no joint")
-        own = np.hstack([file.indices(attributes["JOINTS" + k], len(joints)) for k in names])
-        weights = np.hstack([file.numbers(attributes["WEIGHTS" + k]) for k in names])
-        weights = np.maximum(weights, 0.0)
-        weights[weights.sum(axis=1) == 0.0, 0] = 1.0
-        weights /= weights.sum(axis=1, keepdims=True)
+        own, weights = self._weights(attributes, len(joints))
         if not len(vertices) == len(normals) == len(own) == len(weights):
             raise file.damaged("the attributes of a mesh have different lengths")
         colors = triangle_colors(file, primitive, triangles)
         used, rows = np.unique(triangles, return_inverse=True)  # parts may share their vertices
         surface = Surface(vertices[used], normals[used], rows.reshape(-1, 3))
         return _Piece(surface, joints[own[used]], weights[used], colors)
+
+    def _weights(self, attributes: dict[str, Any], count: int) -> tuple[IntArray, FloatArray]:
+        """What moves each vertex of a mesh, of so many joints (m, 4 s), and how much (m, 4 s)."""
+        file = self._file
+        sets = [k for k in range(_MOST_SETS) if f"JOINTS_{k}" in attributes]
+        if not sets:
+            raise SkinError(f"{file.path} has a mesh with a skin whose vertices follow no joint")
+        own = np.hstack([file.indices(attributes, f"JOINTS_{k}", "VEC4", count) for k in sets])
+        weights = np.hstack([file.numbers(attributes, f"WEIGHTS_{k}", "VEC4") for k in sets])
+        weights = np.maximum(weights, 0.0)
+        weights[weights.sum(axis=1) == 0.0, 0] = 1.0
+        weights /= weights.sum(axis=1, keepdims=True)
+        return own, weights
 
 
 def _joined(pieces: Sequence[_Piece]) -> tuple[Surface, IntArray, FloatArray, FloatArray]:

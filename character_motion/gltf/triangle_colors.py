@@ -22,21 +22,21 @@ def triangle_colors(file: GlbFile, primitive: dict[str, Any], triangles: IntArra
     attributes = primitive["attributes"]
     linear = np.ones((len(triangles), 3))
     if "material" in primitive:
-        material = file.entries("materials")[primitive["material"]]
+        material = file.entry("materials", primitive["material"])
         surface = material.get("pbrMetallicRoughness", {})
         factor = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
         linear *= np.clip(np.array(factor, dtype=np.float64)[:3], 0.0, 1.0)
         texture = surface.get("baseColorTexture")
         if texture is not None:
-            uvs = attributes.get(f"TEXCOORD_{texture.get('texCoord', 0)}")
+            uvs = f"TEXCOORD_{texture.get('texCoord', 0)}"
             picture = _picture(file, texture["index"])
-            if uvs is not None and picture is not None:
-                middles = file.numbers(uvs)[triangles].mean(axis=1)
+            if uvs in attributes and picture is not None:
+                middles = file.numbers(attributes, uvs, "VEC2")[triangles].mean(axis=1)
                 linear *= without_gamma(_sampled(picture, middles))
     elif "COLOR_0" not in attributes:
         return np.full((len(triangles), 3), _GREY)
     if "COLOR_0" in attributes:
-        own = file.numbers(attributes["COLOR_0"])[:, :3]
+        own = file.numbers(attributes, "COLOR_0", "VEC3", "VEC4")[:, :3]
         linear *= np.clip(own, 0.0, 1.0)[triangles].mean(axis=1)
     return with_gamma(linear)
 

@@ -242,9 +242,19 @@ def flat(content: dict[str, Any]) -> None:
     content["skins"][0].pop("inverseBindMatrices")
 
 
+def enormous(content: dict[str, Any]) -> None:
+    content["nodes"][0]["scale"] = [1e200] * 3
+
+
+def colorless(content: dict[str, Any]) -> None:
+    content["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [None] * 4
+
+
 @pytest.mark.parametrize(
     ("edit", "parts"),
     [
+        (enormous, ("damaged", "1e+09")),
+        (colorless, ("damaged", "colour")),
         (without("meshes"), ("no mesh",)),
         (unskinned, ("no mesh with a skin", "bind it")),
         (without("skins"), ("damaged",)),

@@ -10,15 +10,29 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from actuated_characters.render.skin.given import GivenSkin
 from character_motion.gltf.document import GltfDocument
 from character_motion.gltf.reading import GlbFile
 from character_motion.gltf.skinned_mesh import SkinnedMesh, read_skinned_mesh
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import SkinError
 from msgs_config.geometry.surface import Surface
+from tests.support.gltf import WIDTHS
+from tests.support.physics import character
 from tests.support.skins import edited, skinned_glb
 
 WRONG: tuple[Any, ...] = (None, -1, 3, 10**9, 1e38, "x", [], {}, [1], [0, 0, 0], [1e38] * 16)
+KINDS = {
+    "POSITION": ("VEC3",),
+    "NORMAL": ("VEC3",),
+    "JOINTS_0": ("VEC4",),
+    "WEIGHTS_0": ("VEC4",),
+    "TEXCOORD_0": ("VEC2",),
+    "COLOR_0": ("VEC3", "VEC4"),
+    "indices": ("SCALAR",),
+    "inverseBindMatrices": ("MAT4",),
+}
+"""What the standard says that each is of (glTF 2.0, 3.7.2.1 and 3.7.3.1)."""
 QUARTERS = np.array(((255, 0, 0), (0, 255, 0), (0, 0, 255), (90, 120, 150)), dtype=np.uint8)
 
 
@@ -103,9 +117,34 @@ def test_wrong_content_is_one_line(tmp_path: Path, seed: int) -> None:
         holder, key = chance.choice(list(entries(content)))
         holder[key] = chance.choice(WRONG)
 
+    path = tmp_path / "body.glb"
+    path.write_bytes(edited(skinned_glb(), spoil))
     try:
-        mesh = read(tmp_path, edited(skinned_glb(), spoil))
+        skin = GivenSkin.read(path).fitted(character("humanoid"))
     except SkinError as error:
-        assert "\n" not in str(error) and str(error).startswith(str(tmp_path))
+        assert "\n" not in str(error) and str(error).startswith(str(path))
     else:
-        assert np.isfinite(mesh.surface.vertices).all()
+        assert np.isfinite(skin.surface.vertices).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [(name, kind) for name, right in KINDS.items() for kind in WIDTHS if kind not in right],
+)
+def test_numbers_of_another_kind_are_one_line(name: str, wrong: str, tmp_path: Path) -> None:
+    """Even where there are as many rows of them as there must be."""
+
+    def change(content: dict[str, Any]) -> None:
+        primitive = content["meshes"][0]["primitives"][0]
+        holders = (primitive, primitive["attributes"], content["skins"][0])
+        (number,) = (each[name] for each in holders if name in each)
+        accessor = content["accessors"][number]
+        accessor["type"] = wrong
+        accessor.pop("bufferView")  # Then its numbers are zeros, as many as there must be.
+
+    with pytest.raises(SkinError) as caught:
+        read(tmp_path, edited(four_triangles(np.ones((12, 3))), change))
+
+    line = str(caught.value)
+    assert f"{name} is {wrong}; it must be {' or '.join(KINDS[name])}" in line
+    assert "\n" not in line
