@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from character_motion.gltf.reading import GlbFile, Holding
-from character_motion.gltf.triangle_colors import triangle_colors
+from character_motion.gltf.triangle_colors import TriangleColors
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.errors import SkinError
 from msgs_config.geometry.surface import Surface
@@ -70,6 +70,7 @@ class _Reader:
                 f"{file.path} has no mesh with a skin: bind it to bones before it is exported"
             )
         self._joints = self._find_joints()
+        self._colors = TriangleColors(file)
         self._worlds: dict[int, FloatArray] = {}
         self._rows = {node: row for row, node in enumerate(self._joints)}
 
@@ -169,7 +170,7 @@ class _Reader:
         own, weights = self._weights(attributes, len(joints))
         if not len(vertices) == len(normals) == len(own) == len(weights):
             raise file.damaged("the attributes of a mesh have different lengths")
-        colors = triangle_colors(file, primitive, triangles)
+        colors = self._colors.colors(primitive, triangles)
         used, rows = np.unique(triangles, return_inverse=True)  # parts may share their vertices
         surface = Surface(vertices[used], normals[used], rows.reshape(-1, 3))
         return _Piece(surface, joints[own[used]], weights[used], colors)

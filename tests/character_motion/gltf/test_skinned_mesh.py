@@ -87,6 +87,66 @@ def test_a_texture_that_cannot_be_read_is_left_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(mesh.colors, 1.0)
 
 
+def test_a_texture_without_a_picture_is_left_out(tmp_path: Path) -> None:
+    """Where an extension has it, say: it is none of the file's other pictures."""
+
+    def leave_out(content: dict[str, Any]) -> None:
+        content["textures"][0].pop("source")
+
+    mesh = read(tmp_path, edited(four_triangles(), leave_out))
+
+    np.testing.assert_allclose(mesh.colors, 1.0)
+
+
+def test_a_picture_of_many_parts_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def repeat(content: dict[str, Any]) -> None:
+        content["meshes"][0]["primitives"] *= 5
+
+    opened, of_pillow = [], Image.open
+
+    def count(*arguments: Any) -> Any:
+        opened.append(arguments)
+        return of_pillow(*arguments)
+
+    monkeypatch.setattr(Image, "open", count)
+    mesh = read(tmp_path, edited(four_triangles(), repeat))
+
+    np.testing.assert_allclose(mesh.colors, np.tile(QUARTERS / 255.0, (5, 1)), atol=1e-6)
+    assert len(opened) == 1
+
+
+MOVE = {"offset": [0.5, 0.5]}
+TURN = {"offset": [0.0, 1.0], "rotation": np.pi / 2}
+SCALE = {"scale": [0.5, 1.0], "texCoord": 0}
+
+
+@pytest.mark.parametrize(
+    ("transform", "quarters"),
+    [
+        (MOVE, (3, 2, 1, 0)),
+        (TURN, (2, 0, 3, 1)),
+        (SCALE, (0, 0, 2, 2)),
+        ({}, (0, 1, 2, 3)),
+    ],
+    ids=("move", "turn", "scale", "nothing"),
+)
+def test_a_texture_may_be_transformed(
+    transform: dict[str, Any], quarters: tuple[int, ...], tmp_path: Path
+) -> None:
+    """As KHR_texture_transform says: scaled, turned from v to u, moved."""
+
+    def change(content: dict[str, Any]) -> None:
+        content["extensionsRequired"] = ["KHR_texture_transform"]
+        texture = content["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+        texture["extensions"] = {"KHR_texture_transform": transform}
+
+    mesh = read(tmp_path, edited(four_triangles(), change))
+
+    np.testing.assert_allclose(mesh.colors, QUARTERS[list(quarters)] / 255.0, atol=1e-6)
+
+
 def test_what_joints_hang_on_need_not_be_a_joint(tmp_path: Path) -> None:
     """Of a skin whose weights leave out the hips, the legs are trees of their own."""
 
