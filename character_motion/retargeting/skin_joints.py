@@ -16,7 +16,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import ClipError, SkinError, one_of
 from msgs_config.mappings import MappingReader
 
-_SHOWN_NAMES = 40
+_SHOWN_NAMES, _SHOWN_LETTERS = 40, 60
 _SHOULDERS = ("left_shoulder", "right_shoulder")
 
 GivenLinks = Mapping[str, str | None]
@@ -78,7 +78,7 @@ def find_skin_joints(
         missing = missing or links
         raise SkinError(
             f"{place}: no joint found for {', '.join(missing)}; name them in a file for "
-            f"--skin-map, such as '{missing[0]}: NAME'; joints: {', '.join(names[:_SHOWN_NAMES])}"
+            f"--skin-map, such as '{missing[0]}: NAME'; joints: {', '.join(_shown(names))}"
         )
     return found
 
@@ -94,11 +94,11 @@ def _given_joints(
         if joint is None:
             continue
         if joint not in names:
-            shown = list(names)[:_SHOWN_NAMES]
-            raise SkinError(f"{place}: skin map: {link}: {one_of('joint', joint, shown)}")
+            raise SkinError(f"{place}: skin map: {link}: {one_of('joint', joint, _shown(names))}")
         number = list(names).index(joint)
         if number in found.values():
-            raise SkinError(f"{place}: skin map: {link}: another link has joint '{joint}'")
+            (shown,) = _shown([joint])
+            raise SkinError(f"{place}: skin map: {link}: another link has joint '{shown}'")
         found[links.index(link)] = number
     return found
 
@@ -171,6 +171,12 @@ def _by_name(names: Sequence[str], links: Sequence[str]) -> list[tuple[int, int]
     return [
         (row, plain.index(_plain(link))) for row, link in enumerate(links) if _plain(link) in plain
     ]
+
+
+def _shown(names: Sequence[str]) -> list[str]:
+    """The first of some names, each cut, with nothing in them that a terminal would obey."""
+    escaped = [repr(name[:_SHOWN_LETTERS])[1:-1] for name in names[:_SHOWN_NAMES]]
+    return [name[:_SHOWN_LETTERS] for name in escaped]
 
 
 def _plain(name: str) -> str:

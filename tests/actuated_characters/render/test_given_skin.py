@@ -1,5 +1,6 @@
 """A user's own skinned mesh as a character's skin, of which the right answer is known."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -194,6 +195,33 @@ def test_characters_of_one_model_share_the_fitted_mesh(tmp_path: Path) -> None:
     shapes = drawn_shapes(humanoid)
 
     assert skin_of(humanoid, shapes, mesh) is skin_of(humanoid, shapes, mesh)
+
+
+def harmful(name: str) -> str:
+    """A name that begins with an escape code and a line's end, and is long."""
+    return "\x1b[2J\n" + name + 10_000 * "x"
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        {},
+        {"left_knee": "pillar"},
+        {"left_knee": harmful("pillar")},
+        {"root": harmful("mixamorig:Hips"), "chest": harmful("mixamorig:Hips")},
+    ],
+)
+def test_joints_are_named_without_what_a_terminal_obeys(
+    joints: dict[str, str], tmp_path: Path
+) -> None:
+    names = {link: harmful(name.replace("Left", "Near")) for link, name in MIXAMO.items()}
+
+    with pytest.raises(ActuatedCharactersError) as caught:
+        given(tmp_path, skinned_glb(names), json.dumps(joints)).fitted(character("humanoid"))
+
+    line = str(caught.value)
+    assert line.isprintable() and len(line) < 4000
+    assert "mixamorig:Hips" in line  # Only the end of a name is cut.
 
 
 # Files that cannot be used
