@@ -92,6 +92,8 @@ def _play(options: argparse.Namespace) -> None:
         return
     if not options.no_view:
         require_extra("view", "play (without --no-view)")
+    elif options.skin or options.skin_map:
+        raise ConfigurationError("--skin and --skin-map are of a browser; leave out --no-view")
     given_skin(options)  # its errors come before all the work
     _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
 

@@ -25,6 +25,8 @@ def walk() -> Made:
         (("view", "bag", "--skin", "body.glb", "--skin-map", "no.yaml"), "no.yaml"),
         (("view", "--skin", "no.glb"), "cannot read no.glb"),
         (("play", "--skin", "no.glb"), "cannot read no.glb"),
+        (("play", "--no-view", "--skin", "body.glb"), "are of a browser"),
+        (("play", "--no-view", "--skin-map", "joints.yaml"), "are of a browser"),
         (("run", "--view", "--skin", "no.glb"), "cannot read no.glb"),
         (("run", "--clip", "walk", "--skin", "body.glb"), "are of --view"),
     ],
