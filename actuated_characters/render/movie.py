@@ -142,7 +142,8 @@ class Movie:
     def _with_views(self, frames: Sequence[FrameSpec]) -> list[FrameSpec]:
         """The frames with their views, the places of their ghosts and the length of arrows."""
         scene, heading = self._scene, _heading(self._scene)
-        posed = PosedCharacters(scene.characters)
+        settings = self._settings
+        posed = PosedCharacters(scene.characters, settings.skin if settings.skinned else None)
         path, some = (
             camera_path(scene)[self._rows],
             slice(None, None, ceil(len(self) / _MOST_FRAMED)),
@@ -161,7 +162,7 @@ class Movie:
             posed.outline(ghosts, ways[some]).moved(offset),
             posed.tails(scene.position[self._rows], ways, [f.forces for f in frames], longest),
         ]
-        wide, high = self._settings.size
+        wide, high = settings.size
         view = framing(Spheres.joined(seen), wide / high, like)
         return [
             replace(frame, view=view.moved(*way), ghost_offset=offset, arrow_length=longest)

@@ -165,7 +165,7 @@ def _draw_strip(
     count = len(frames)
     if not count or (columns is not None and columns < 1):
         raise ConfigurationError(f"{count} pictures in rows of {columns}; both must be 1 or more")
-    size, frames = _with_views(characters, frames, size)
+    size, frames = _with_views(characters, frames, size, look)
     settings = SceneSettings(characters, world.ground, world.terrain, size, captioned, *look)
     tiles: list[Picture] = []
     for picture in draw(settings, frames):
@@ -176,10 +176,11 @@ def _draw_strip(
 
 
 def _with_views(
-    characters: Sequence[Character], frames: Sequence[FrameSpec], size: Size | None
+    characters: Sequence[Character], frames: Sequence[FrameSpec], size: Size | None, look: _Look
 ) -> tuple[Size, list[FrameSpec]]:
     """The pictures' size, by default one that suits the poses, and the frames with their views."""
-    posed, like = PosedCharacters(characters), CameraPose()
+    posed = PosedCharacters(characters, look.skin if look.skinned else None)
+    like = CameraPose()
     positions = np.array([frame.position for frame in frames])
     ghosts = [f.ghost for f in frames if f.ghost is not None and np.isfinite(f.ghost).all()]
     seen = np.concatenate((positions, *(ghost[np.newaxis] for ghost in ghosts)))

@@ -1,6 +1,6 @@
 """Characters in poses to be seen: where their links are, and spheres around what they look like."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -9,6 +9,9 @@ import numpy as np
 from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.engine.camera_pose import Spheres
 from actuated_characters.render.engine.outlines import outline
+from actuated_characters.render.skin.choosing import skin_of
+from actuated_characters.render.skin.given import GivenSkin
+from actuated_characters.render.skin.skin import PosedSkin
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
@@ -35,8 +38,17 @@ class PosedCharacters:
     A position (n,) is theirs one after the other, and so are the links.
     """
 
-    def __init__(self, characters: Sequence[Character]) -> None:
-        """Find the shapes. Raises CharacterError if a file of a character cannot be used."""
+    def __init__(self, characters: Sequence[Character], skin: GivenSkin | None = None) -> None:
+        """Find the shapes.
+
+        Args:
+            characters: Which.
+            skin: A mesh from a file that is seen of each of them; it may be larger than the shapes.
+
+        Raises:
+            CharacterError: a file of a character cannot be used.
+            SkinError: `skin` does not fit a character.
+        """
         self._characters = characters
         self._models = [DynamicsModel(character) for character in characters]
         self._ends = np.cumsum([character.layout.size for character in characters])
@@ -50,6 +62,13 @@ class PosedCharacters:
         self._spheres = Spheres.joined([*self._around, origins])
         numbers = np.repeat(np.arange(count), [len(each.radii) for each in self._around])
         self._links = np.concatenate((numbers, np.arange(count)))
+        self._skins = [] if skin is None else self._outermost(skin)
+
+    def _outermost(self, given: GivenSkin) -> list[PosedSkin]:
+        """Where the skin of each character ends."""
+        pairs = zip(self._characters, self.shapes_of_characters, strict=True)
+        skins = [skin_of(character, shapes, given) for character, shapes in pairs]
+        return [PosedSkin(skin.outermost()) for skin in skins if skin is not None]
 
     def frames(self, position: FloatArray) -> Frames:
         """Where the link frames are at a position (n,), message form.
@@ -66,11 +85,22 @@ class PosedCharacters:
         return np.concatenate(origins), np.concatenate(turns_xyzw)
 
     def spheres(self, frames: Frames) -> Spheres:
-        """Spheres around all that is seen; none where the frames are NaN."""
+        """Spheres around all that is seen, and points of a skin; none where the frames are NaN."""
         origins, turns_xyzw = frames[0][self._links], frames[1][self._links]
         there = np.isfinite(origins[:, 0])
         local, radii = self._spheres.centres[there], self._spheres.radii[there]
-        return Spheres(origins[there] + rotations.rotate(turns_xyzw[there], local), radii)
+        spheres = Spheres(origins[there] + rotations.rotate(turns_xyzw[there], local), radii)
+        return Spheres.joined([spheres, *self._ends_of_skins(frames)])
+
+    def _ends_of_skins(self, frames: Frames) -> Iterator[Spheres]:
+        """The outermost points of each skin, as spheres of no size."""
+        first = 0
+        for skin in self._skins:
+            links = slice(first, first + len(skin.skin.origins))
+            first = links.stop
+            if np.isfinite(frames[0][links]).all():
+                points = skin.surface(frames[0][links], frames[1][links]).vertices
+                yield Spheres(points, np.zeros(len(points)))
 
     def stand_on_ground(self) -> bool:
         """Whether all are above the ground, none hanging through it as a pendulum does."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from msgs_config.geometry.surface import Surface
 
 BONES = 4
 """Links that move a vertex, at most."""
+_SIDES = (-1.0, 0.0, 1.0)
+_DIRECTIONS = np.array([way for way in product(_SIDES, repeat=3) if any(way)])
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,31 @@ class Skin:
             centres[row] = 0.5 * (local.min(axis=0) + local.max(axis=0))
             radii[row] = fixed_order.norm(local - centres[row]).max()
         return centres, radii
+
+    def outermost(self) -> "Skin":
+        """The vertices alone that are outermost of those that follow a link most.
+
+        Wherever the links are, the skin ends near these: 26 directions are looked into.
+        """
+        found = []
+        for row in np.unique(self.bones[:, 0]):
+            own = np.flatnonzero(self.bones[:, 0] == row)
+            back = rotations.conjugate(self.turns_xyzw[row])
+            local = rotations.rotate(back, self.surface.vertices[own] - self.origins[row])
+            found.append(own[[np.argmax(fixed_order.dot(local, way)) for way in _DIRECTIONS]])
+        rows = np.unique(np.concatenate(found))
+        return Skin(
+            Surface(
+                self.surface.vertices[rows],
+                self.surface.normals[rows],
+                np.empty((0, 3), dtype=np.intp),
+            ),
+            np.empty(0, dtype=np.intp),
+            self.bones[rows],
+            self.weights[rows],
+            self.origins,
+            self.turns_xyzw,
+        )
 
     def link_colors(self) -> FloatArray | None:
         """The mean colour of each link (l, 3), 0 to 1, if it has its own."""
