@@ -36,6 +36,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.bus.once_logger import OnceLogger
 from msgs_config.bus.polling import PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters
+from msgs_config.character.layout import ROOT
 from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError, SkinError
 from msgs_config.messages import topics
@@ -202,7 +203,10 @@ class ViewerNode(Node):
         name = f"{WORLD}/characters{below}/{_LEAF}"
         bind = self._hands.bind(below, lambda: self._drawn.get(below))
         self._hands.open_topics(below, watched.simulator)
-        self._parameters[below] = shown_parameters(rebuilt.character, self._settings.controls)
+        drives_root = ROOT in rebuilt.known.parameters.get("commanded_joints", [ROOT])
+        self._parameters[below] = shown_parameters(
+            rebuilt.character, self._settings.controls, drives_root=drives_root
+        )
         try:
             with self._server.atomic():
                 number = self._number_of(watched)

@@ -38,6 +38,12 @@ class WatchedNamespace:
         return episode_session(self.episode_text) == self.rebuilt.known.session
 
     @property
+    def place_in_world(self) -> int:
+        """Which one of its world it is, from 0 on."""
+        world = None if self.rebuilt is None else self.rebuilt.world
+        return world.characters.index(world.name) if world and world.name in world.characters else 0
+
+    @property
     def simulator(self) -> str:
         """The namespace of the simulator, which begins with `/` or is empty."""
         inner = self.rebuilt.world.namespace if self.rebuilt is not None else ""
@@ -148,8 +154,9 @@ class WatchedSimulators:
 
     @property
     def characters(self) -> list[WatchedNamespace]:
-        """All characters that are known."""
-        return [each for each in self._watched.values() if each.rebuilt is not None]
+        """All characters that are known, those of a world in its own order."""
+        known = [each for each in self._watched.values() if each.rebuilt is not None]
+        return sorted(known, key=lambda each: (each.simulator, each.place_in_world))
 
     @property
     def balls(self) -> dict[str, BallReader]:

@@ -19,7 +19,13 @@ _WINDOW = 8.0  # s that a curve shows
 _STEP = 0.02  # s between two points of a curve
 _PERIOD = 0.2  # s of wall time between two pictures of a curve: the page draws each anew
 _ASKING_PERIOD = 2.0  # s of wall time between two looks at parameters that others may set
-_COLOURS = {"it is": "#2a6fbb", "it should be": "#40be6e", "theory": "#d9480f"}
+_SERIES = (
+    uplot.Series(label="s before now"),
+    uplot.Series(label="it is", stroke="#2a6fbb", width=2),
+    uplot.Series(label="it should be", stroke="#40be6e", width=2),
+    uplot.Series(label="theory", stroke="#d9480f", width=2, dash=(7.0, 5.0)),
+)
+_TIME = uplot.Scale(time=False, auto=False, range=(-_WINDOW, 0.0))
 _ASPECT = 1.6
 _MARGIN, _LEAST_MARGIN = 0.08, 0.01  # share of the height; m or rad
 _LEAST_SHARE = 0.3  # of a plot's height that curves have, or it fits anew
@@ -111,7 +117,8 @@ class ShownCurves:
         self._next_picture = now + _PERIOD
         for name, points in self._points.items():
             values = np.array(points).T
-            data = tuple(values[:, values[0] >= values[0, -1] - _WINDOW])
+            values[0] -= values[0, -1]  # the page keeps the scale of its time as it is
+            data = tuple(values[:, values[0] >= -_WINDOW])
             if name not in self._plots and len(points) > 1:
                 self._plots[name] = self._add_plot(name, data)
             if name in self._plots:
@@ -128,21 +135,15 @@ class ShownCurves:
         margin = max(_MARGIN * (high - low), _LEAST_MARGIN)
         self._ranges[name] = around = low - margin, high + margin
         y = uplot.Scale(auto=False, range=around)
-        self._plots[name].scales = {"x": uplot.Scale(time=False), "y": y}
+        self._plots[name].scales = {"x": _TIME, "y": y}
 
     def _add_plot(self, title: str, data: tuple[FloatArray, ...]) -> Any:
         with self._folder:
             return self._gui.add_uplot(
                 data,
-                (
-                    uplot.Series(label="s"),
-                    *(
-                        uplot.Series(label=label, stroke=color, width=2)
-                        for label, color in list(_COLOURS.items())[: len(data) - 1]
-                    ),
-                ),
+                _SERIES[: len(data)],
                 title=title,
-                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-                legend=uplot.Legend(show=True),
+                scales={"x": _TIME, "y": uplot.Scale(auto=True)},
+                legend=uplot.Legend(show=True, live=False),
                 aspect=_ASPECT,
             )

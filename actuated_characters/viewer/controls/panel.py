@@ -30,7 +30,15 @@ from msgs_config.messages import topics
 
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
-_HELP = "Drag a body to push it. Shift and click throws a ball at it."
+_HELP = (
+    "Drag a body to pull it. Shift and click throws a ball at it. Drag the background to look "
+    "around."
+)
+_LEGEND = (
+    "Green: where it should be. Redder: the torque is nearer its limit. Darker: the right side. "
+    "Grey arrows: forces of contacts; half a metre is its weight. Orange: pushes. Yellow: the "
+    "centre of mass; blue: what it stands on."
+)
 _TEXT_PERIOD = 0.2  # s between texts: the page lays each out
 _NAME_OF_ONLY_CHARACTER = "alone"  # the character of a simulator that has one, without a name
 
@@ -75,7 +83,8 @@ class ControlPanel:
         self._state = gui.add_markdown("no simulator")
         self._which: Any = gui.add_dropdown("Character", (_NAME_OF_ONLY_CHARACTER,), visible=False)
         self._add_run()
-        self._told = gui.add_markdown(_HELP)
+        gui.add_markdown(_HELP)
+        self._told = gui.add_markdown("", visible=False)
         self._curves = ShownCurves(gui, self.requests, settings.curves)
         order = self._told.order + 0.5  # of the controls that a scene has first
         self._drive = DrivingControls(node, gui, actions)
@@ -121,6 +130,7 @@ class ControlPanel:
     def _add_shown(self) -> None:
         gui = self._gui
         with gui.add_folder("Show", expand_by_default=False):
+            gui.add_markdown(_LEGEND)
             for name, label in SHOWN.items():
                 box = gui.add_checkbox(label, initial_value=self.shows[name])
                 box.on_update(self._later(partial(self._show, name), _value_of(box)))
@@ -158,7 +168,7 @@ class ControlPanel:
         stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
         if stamp_ns is not None and now >= self._next_text:
             self._next_text = now + _TEXT_PERIOD
-            text = f"**{as_text(chosen.character)}**  \n{1e-9 * stamp_ns:.2f} s"
+            text = f"**{as_text(chosen.character)}**, {1e-9 * stamp_ns:.2f} s"
             if self._state.content != text:
                 self._state.content = text
 
@@ -181,7 +191,7 @@ class ControlPanel:
 
     def tell(self, sentence: str) -> None:
         """Show a sentence, of a node for instance, as it is."""
-        self._told.content = as_text(sentence or _HELP)
+        self._told.content, self._told.visible = as_text(sentence), bool(sentence)
         self._curves.look_soon()
 
     def _tell_of(self, node: str, sentence: str) -> None:

@@ -43,15 +43,15 @@ _LAW = (
     ShownParameter("law", "Law", options=LAWS.names),
     ShownParameter("gain_scale.p", "Stiffness ×", range=(0.0, 3.0, 0.05)),
     ShownParameter("gain_scale.d", "Damping ×", range=(0.0, 3.0, 0.05)),
+    ShownParameter(_FORCE, "Root force (N)", range=(0.0, 2000.0, 10.0), has_no_limit=True),
     ShownParameter(
-        f"effort_limit.{ROOT}", "Root force (N)", range=(0.0, 2000.0, 10.0), has_no_limit=True
-    ),
-    ShownParameter(
-        f"effort_limit.{ROOT_TORQUE}",
-        "Root torque (N m)",
+        _TORQUE,
+        "Root torque (N\u00a0m)",
         range=(0.0, 1000.0, 5.0),
         has_no_limit=True,
     ),
+)
+_BALANCE = (
     ShownParameter("balance.enabled", "Balance"),
     ShownParameter("balance.stiffness", "Balance (N/m)", range=(0.0, 5000.0, 50.0)),
     ShownParameter("balance.damping", "Balance (N s/m)", range=(0.0, 1000.0, 10.0)),
@@ -99,7 +99,7 @@ def check_settings(settings: ViewerSettings) -> None:
 
 def check_controls(texts: Sequence[str]) -> None:
     """Raise ConfigurationError if a text is none that `shown_parameters` takes of any character."""
-    names = [".".join(each.key) for each in (*_LAW, *_WORLD)]
+    names = [".".join(each.key) for each in (*_LAW, *_BALANCE, *_WORLD)]
     names += [f"{CONTROLLER}.{name}" for name in ("behaviour", "clip")]
     for text in texts:
         if len(text.split()) != 1:
@@ -109,13 +109,14 @@ def check_controls(texts: Sequence[str]) -> None:
 
 
 def shown_parameters(
-    character: Character, first: Sequence[str] = ()
+    character: Character, first: Sequence[str] = (), *, drives_root: bool = True
 ) -> dict[str, tuple[ShownParameter, ...]]:
     """Those of a character's nodes, by the titles of the panel's folders.
 
     Args:
         character: Whose joints and clips there are.
         first: Those that come first: sliders, see `parse_slider`, or NODE.NAME of other ones.
+        drives_root: Whether a force and a torque at the root are among the commands.
     """
     motion = [ShownParameter("behaviour", "Behaviour", options=BEHAVIOUR_PARAMETERS[0].choices)]
     if clips := available_clips(character):
@@ -128,7 +129,9 @@ def shown_parameters(
         if name not in character.layout.followers
         if name not in (ROOT, ROOT_TORQUE)
     )
-    folders = {"Controller": _LAW, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
+    law = tuple(each for each in _LAW if drives_root or each.name not in (_FORCE, _TORQUE))
+    law += _BALANCE if character.feet else ()
+    folders = {"Controller": law, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
     known = {".".join(each.key): each for own in folders.values() for each in own}
     own = [
         parse_slider(text) if len(text.split()) > 1 else known[text]

@@ -15,7 +15,7 @@ from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
-_CONTACT, _PUSH, _CENTRE, _SUPPORT = (30, 150, 60), (230, 60, 20), (250, 200, 0), (40, 110, 200)
+_CONTACT, _PUSH, _CENTRE, _SUPPORT = (70, 72, 80), (230, 60, 20), (250, 200, 0), (40, 110, 200)
 _METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
 _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
 _MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least

@@ -16,13 +16,17 @@ _ABOVE = 0.25  # m, from the highest link's frame to the text
 _MOST_CHARACTERS = 20  # of a mode
 _SMALL = 0.6  # of the size of a text
 _UNTOLD = "TRACK"  # the mode in which nothing happens to a character
-_UNREADABLE = (ValueError, KeyError, TypeError, RecursionError)
+_UNREADABLE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 
 def mode_of(text: str) -> str:
-    """The mode that a message of `~/mode` tells, a JSON object; empty if it tells none."""
+    """The mode that a message of `~/mode` tells, a JSON object; empty if it tells none.
+
+    Of a state machine it is the state's name.
+    """
     with suppress(*_UNREADABLE):
-        return str(json.loads(text)["mode"])[:_MOST_CHARACTERS]
+        facts = json.loads(text)
+        return str(facts.get("state", facts["mode"]))[:_MOST_CHARACTERS]
     return ""
 
 

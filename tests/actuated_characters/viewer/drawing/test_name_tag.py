@@ -54,7 +54,13 @@ def test_a_new_episode_begins_with_no_falls() -> None:
 
 @pytest.mark.parametrize(
     ("text", "mode"),
-    [('{"mode": "LIMP", "stamp_ns": 1}', "LIMP"), ("{}", ""), ("no JSON", ""), ("[]", "")],
+    [
+        ('{"mode": "LIMP", "stamp_ns": 1}', "LIMP"),
+        ('{"mode": "STATE", "state": "crouch"}', "crouch"),
+        ("{}", ""),
+        ("no JSON", ""),
+        ("[]", ""),
+    ],
 )
 def test_a_mode_is_read_from_its_message(text: str, mode: str) -> None:
     assert mode_of(text) == mode
