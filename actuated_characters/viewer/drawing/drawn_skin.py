@@ -101,17 +101,21 @@ class DrawnSkin:
 
 
 class GhostSkin:
-    """A reference: the inner side of a skin that is a little wider, which bodies before it hide."""
+    """A reference: the inner side of a skin that is a little wider, which bodies before it hide.
+
+    The mesh goes along with the root: a page that draws slowly moves bones sooner than nodes, and
+    would show a reference that runs ahead of the body.
+    """
 
     def __init__(self, scene: viser.SceneApi, name: str, skin: Skin, color: Color) -> None:
         """Add it as one mesh."""
-        surface = skin.surface
+        surface, root = skin.surface, skin.origins[0]
         self.handle = scene.add_mesh_skinned(
             name,
-            surface.vertices + _OUTLINE_WIDTH * surface.normals,
+            surface.vertices + _OUTLINE_WIDTH * surface.normals - root,
             surface.triangles,
             bone_wxyzs=rotations.wxyz_from_xyzw(skin.turns_xyzw),
-            bone_positions=skin.origins,
+            bone_positions=skin.origins - root,
             skin_weights=_weights(skin, np.arange(len(skin.bones)), range(len(skin.origins))),
             color=color,
             side="back",
@@ -123,9 +127,10 @@ class GhostSkin:
 
     def bend(self, origins: FloatArray, turns_xyzw: FloatArray) -> None:
         """Have it follow the links: origins (l, 3), m, world, and orientations (l, 4)."""
-        impl = self.handle._impl
+        impl, root = self.handle._impl, origins[0]
+        self.handle.position = root
         turns = rotations.wxyz_from_xyzw(turns_xyzw).tolist()
-        for bone, (place, turn) in enumerate(zip(origins.tolist(), turns, strict=True)):
+        for bone, (place, turn) in enumerate(zip((origins - root).tolist(), turns, strict=True)):
             impl.api._queue_scene_message(SetBonePositionMessage(impl.name, bone, tuple(place)))
             impl.api._queue_scene_message(SetBoneOrientationMessage(impl.name, bone, tuple(turn)))
 
