@@ -153,7 +153,7 @@ $(if $(filter 1,$(BULLET)),@$(PIP) install pybullet==3.2.7 || { echo "$(PIP_FAIL
 @$(PIP) install -qq -e '.[$(1)]' || { echo "$(PIP_FAILED)" >&2; exit 1; }
 $(if $(filter 0,$(BULLET)),@$(PIP) uninstall -qq -y pybullet)
 @$(BIN)/python -m msgs_config.fetch_robots || { echo "$(PIP_FAILED)" >&2; exit 1; }
-@$(BIN)/python -m actuated_characters.compile_all
+@$(BIN)/python -m actuated_characters.compile_all $(if $(findstring test,$(1)),,--runs)
 @echo '$(BULLET)' > .venv/.bullet
 endef
 

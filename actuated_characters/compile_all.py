@@ -1,8 +1,10 @@
 """`python -m actuated_characters.compile_all`: what is computed often is compiled, and kept.
 
 Else that which the planner, the renderer and batches compute is compiled at the first plan, picture
-and step.
+and step. `--runs` leaves out batches, which training alone needs, and which take nearly half of it.
 """
+
+import sys
 
 from actuated_characters.batch.worlds import Batch
 from actuated_characters.render.engine.renderer import FrameSpec, Renderer
@@ -14,7 +16,7 @@ _SIZE = (64, 48)  # pixels
 
 
 def main() -> None:
-    """Plan a few ticks of a walk in a world of each engine, and draw the last one."""
+    """Plan a few ticks of a walk in a world of each engine, draw the last one, and step a batch."""
     clip = {"reference": "clip", "clip": "walk"}
     predictive = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
     for engine in INSTALLED_ENGINES:
@@ -23,6 +25,8 @@ def main() -> None:
             plan = make_plan("humanoid", 0.05, clip, simulator, planner)
             *_, last = ticks_in_process(plan)
     Renderer(plan.character, skinned=True).picture(FrameSpec(last.following.position), _SIZE)
+    if sys.argv[1:] == ["--runs"]:
+        return
     with Batch(plan.character, 1, threads=1, clip="walk") as batch:
         batch.step()
 
