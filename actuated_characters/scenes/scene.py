@@ -13,11 +13,11 @@ from msgs_config.shared_parameters import CharacterSource, SharedSettings
 SIMULATOR, CONTROLLER, VIEWER = "sim_node", "controller_node", "viewer"
 _FOLDER = Path(__file__).parent / "data"
 _SUFFIX = ".yaml"
-Parameters = dict[str, object]
-
 _PARAMETERS = "ros__parameters"
 _ANY_NAMESPACE = "/**"
 _OPPONENT = "opponent"
+Parameters = dict[str, object]
+
 _DEFAULTS: Parameters = {
     "rate": 240,  # Hz
     "real_time_factor": 1.0,

@@ -46,8 +46,7 @@ class WatchedNamespace:
     @property
     def simulator(self) -> str:
         """The namespace of the simulator, which begins with `/` or is empty."""
-        inner = self.rebuilt.world.namespace if self.rebuilt is not None else ""
-        return f"/{inner}" if inner else ""
+        return "" if self.rebuilt is None else self.rebuilt.world.topics_below
 
 
 class WatchedSimulators:

@@ -1,6 +1,5 @@
 """An arrow that is drawn on the body of a recorded run, in a real browser, becomes a fork."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +22,8 @@ from tests.actuated_characters.viewer.test_browser import (
     drag,
     grip_of,
 )
-from tests.support.browser import SHIFT, Browser, needs_chromium, one_browser
-from tests.support.ros import Process, Processes, wait_until
+from tests.support.browser import SHIFT, Browser, needs_chromium
+from tests.support.ros import Process, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
 
@@ -34,17 +33,6 @@ ROW = 48  # of the state of 0.2 s, in which the arrow is drawn
 @pytest.fixture
 def walk(tmp_path: Path) -> Path:
     return make_walk(tmp_path / "walk")
-
-
-@pytest.fixture
-def viewer(processes: Processes, walk: Path) -> Process:
-    return processes.command("view", str(walk))
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    with one_browser(tmp_path) as browser:
-        yield browser
 
 
 def go_to_the_row(browser: Browser) -> None:

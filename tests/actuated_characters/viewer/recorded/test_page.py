@@ -2,7 +2,6 @@
 
 import io
 import signal
-from collections.abc import Iterator
 from pathlib import Path
 
 import av
@@ -11,8 +10,8 @@ import pytest
 
 from actuated_characters.runs.plan import make_plan
 from tests.actuated_characters.viewer.test_browser import SOON, address_of, body_of
-from tests.support.browser import Browser, Pixels, needs_chromium, one_browser
-from tests.support.ros import Process, Processes, wait_until
+from tests.support.browser import Browser, Pixels, needs_chromium
+from tests.support.ros import Process, wait_until
 from tests.support.runs import run_plan_here
 
 pytestmark = [pytest.mark.slow, pytest.mark.sharing, needs_chromium]
@@ -26,17 +25,6 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = make_plan("humanoid", 1.0, {"reference": "clip", "clip": "walk"}, {}, {})
     run_plan_here(plan, directory)
     return directory
-
-
-@pytest.fixture
-def viewer(processes: Processes, walk: Path) -> Process:
-    return processes.command("view", str(walk))
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    with one_browser(tmp_path) as browser:
-        yield browser
 
 
 def load(browser: Browser, viewer: Process) -> Pixels:

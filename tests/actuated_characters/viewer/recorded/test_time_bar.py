@@ -1,7 +1,6 @@
 """The time line at the bottom of a recorded run's page, in a real browser."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import parse_push
 from tests.actuated_characters.viewer.test_browser import SOON, address_of
-from tests.support.browser import SHIFT, Browser, needs_chromium, one_browser
+from tests.support.browser import SHIFT, Browser, needs_chromium
 from tests.support.ros import Process, Processes, wait_until
 from tests.support.runs import run_plan_here
 
@@ -29,17 +28,6 @@ def make_walk(directory: Path) -> Path:
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_walk(tmp_path_factory.mktemp("runs") / "walk")
-
-
-@pytest.fixture
-def viewer(processes: Processes, walk: Path) -> Process:
-    return processes.command("view", str(walk))
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    with one_browser(tmp_path) as browser:
-        yield browser
 
 
 def open_bar(browser: Browser, viewer: Process) -> None:
