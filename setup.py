@@ -32,6 +32,7 @@ setup(
         "msgs_config": ["runtime/*.xml", "character/data/*"],
         "controller_node": [
             "references/data/*.yaml",
+            "references/timeline/data/*.yaml",
             "behaviours/state_machine/data/*.yaml",
             "planner/policy/shipped/*.npz",
         ],

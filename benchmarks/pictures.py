@@ -21,6 +21,7 @@ from actuated_characters.render.movie import GhostPlace, Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.wrenches import parse_push
 from lecture.framework.runner import Runner
 from lecture.gains import FACTORS
@@ -83,7 +84,9 @@ def simulate(clip: str, duration: float, texts: tuple[str, ...] = ()) -> Recordi
     with TemporaryDirectory() as folder:
         directory = Path(folder) / "run"
         prepare_directory(directory, overwrite=False)
-        run_in_process(plan, directory, pushes=[parse_push(text, plan) for text in texts])
+        run_in_process(
+            plan, directory, inputs=PlannedInputs([parse_push(text, plan) for text in texts])
+        )
         return read_recording(directory)
 
 

@@ -12,6 +12,8 @@ from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
 from controller_node.references.keyframes import KeyframesSettings, keyframes_path
 from controller_node.references.steering.factory import GaitSettings, clips_of_gait
+from controller_node.references.timeline.file import timeline_path
+from controller_node.references.timeline.motion import TimelineSettings
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import clip_path
 from msgs_config.parameters import Values
@@ -29,6 +31,8 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
         files[f"clip {name}"] = clip_path(character, name)
     if MotionSettings.of(values).reference == "keyframes":
         files["keyframes"] = keyframes_path(KeyframesSettings.of(values).keyframes)
+    if MotionSettings.of(values).reference == "timeline":
+        files["timeline"] = timeline_path(TimelineSettings.of(values).timeline)
     if behaviour == STATE_MACHINE:
         files["machine"] = machine_path(MachineSettings.of(values).machine)
     if PlannerParameters.of(values).planner in (POLICY, HYBRID):

@@ -2,8 +2,7 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.parameter_list import print_parameters
+from actuated_characters.commands.common.planned_run import DURATION, PlannedRun, planned_run
 from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.run_options import (
     ALL_SENSORS,
@@ -21,13 +21,13 @@ from actuated_characters.commands.common.run_options import (
     add_viewed,
 )
 from actuated_characters.commands.common.settings import (
+    CHARACTER,
     NODES,
     Commands,
     add_character,
     add_command,
     add_inputs,
     add_repeated,
-    node_settings,
 )
 from actuated_characters.commands.common.skin_options import given_skin
 from actuated_characters.commands.common.tables import make_table
@@ -37,13 +37,7 @@ from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.runs.plan import RunPlan
-    from actuated_characters.runs.planned.throws import PlannedThrow
-    from actuated_characters.runs.planned.velocities import PlannedVelocity
-    from actuated_characters.runs.planned.wrenches import PlannedPush
-    from controller_node.references.files.reconstructed import FoundWith
 
-_DURATION = 10.0  # s
-_NO_PUSH = "none"
 _RECORDING = {  # the recorder's parameters by the names of options
     "compression": "compression",
     "log_time": "log_time",
@@ -69,13 +63,13 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         choices=(*NODES, "recorder"),
         help="list this node's parameters, with the values that the run would have, and end",
     )
-    add_character(run)
+    add_character(run, None, f"{CHARACTER}, or that of a timeline")
     add_tracked(run)
     run.add_argument(
         "--duration",
         type=float,
         metavar="S",
-        help=f"simulated time in s ({_DURATION:g}, or that of a reconstruction)",
+        help=f"simulated time in s ({DURATION:g}, or that of a reconstruction or timeline)",
     )
     run.add_argument(
         "--output",
@@ -112,6 +106,7 @@ def _run(options: argparse.Namespace) -> None:
 
     if options.parameters is not None:
         plan = planned_run(options).plan
+        _check_options(options, plan)
         print_parameters(options.parameters, plan, _recording(options, plan))
         return
     if options.view:
@@ -123,6 +118,7 @@ def _run(options: argparse.Namespace) -> None:
         require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)
     plan, motion = run.plan, run.plan.motion_name
+    _check_options(options, plan)
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     if options.output is None and not options.overwrite:
@@ -131,8 +127,8 @@ def _run(options: argparse.Namespace) -> None:
         prepare_directory(directory, overwrite=options.overwrite)
     for warning in run.warnings:
         print(warning)
-    if run.pushes and not options.push:
-        print(f"{options.clip} brings {len(run.pushes)} pushes (--push none: without them)")
+    if run.inputs.pushes and not options.push and options.timeline is None:
+        print(f"{options.clip} brings {len(run.inputs.pushes)} pushes (--push none: without them)")
     with progress_bar(f"{plan.character.name}: {motion}", plan.ticks, "ticks") as bar:
 
         def progress(ticks: int) -> None:
@@ -150,57 +146,6 @@ def _run(options: argparse.Namespace) -> None:
     for text, hit in zip(options.throw, hits, strict=True):
         print(f"throw '{text}': {hit}")
     print(f"a picture of the figures: {directory / PLOT}")
-
-
-@dataclass(frozen=True)
-class PlannedRun:
-    """A run as the command's options describe it."""
-
-    plan: "RunPlan"
-    pushes: "Sequence[PlannedPush]"
-    throws: "Sequence[PlannedThrow]"
-    velocities: "Sequence[PlannedVelocity]"
-    warnings: Sequence[str]  # sentences that the user should read
-
-
-def planned_run(options: argparse.Namespace) -> PlannedRun:
-    """Plan the run that the options describe; raises ActuatedCharactersError if it cannot be."""
-    from actuated_characters.runs.brought import bring_parameters
-    from actuated_characters.runs.plan import make_plan
-    from actuated_characters.runs.planned.throws import plan_throws
-    from actuated_characters.runs.planned.velocities import plan_velocities
-    from msgs_config.character.loading import load_character
-    from msgs_config.shared_parameters import collides
-
-    settings = node_settings(options.set, NODES)
-    simulator, controller = settings["sim_node"], settings["controller_node"]
-    if options.view:
-        simulator.setdefault("real_time_factor", 1.0)
-    for name in ("behaviour", "planner", "collision"):
-        _set_option(name, getattr(options, name), controller)
-    if options.machine is not None:
-        if options.behaviour not in (None, "state_machine"):
-            raise ConfigurationError(
-                f"--machine goes with --behaviour state_machine, not {options.behaviour}"
-            )
-        _set_option("machine", options.machine, controller)
-        _set_option("behaviour", "state_machine", controller)
-    character = load_character(options.character, collides(simulator | controller))
-    found_in = bring_parameters(character, options.clip, simulator, controller)
-    duration = options.duration
-    if duration is None:
-        duration = _DURATION if found_in is None else found_in.duration
-    reference = _reference(options)
-    plan = make_plan(
-        options.character, duration, reference, simulator, controller, loaded=character
-    )
-    _check_options(options, plan)
-    velocities: list[PlannedVelocity] = []
-    if options.cmd_vel is not None:
-        plan, velocities = plan_velocities(plan, options.cmd_vel)
-    pushes = _pushes(options.push, plan, found_in)
-    throws, in_the_way = plan_throws(plan, options.throw)
-    return PlannedRun(plan, pushes, throws, velocities, [*plan.warnings, *in_the_way])
 
 
 def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
@@ -258,7 +203,7 @@ def _run_plan(
     from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 
     check_interruption()  # all modules are imported by now
-    plan, pushes, throws = planned.plan, planned.pushes, planned.throws
+    plan, throws = planned.plan, planned.inputs.throws
     if options.in_process:
         run = run_in_process
     else:
@@ -270,41 +215,7 @@ def _run_plan(
         write_bag=not options.no_record,
         progress=progress,
         recording=_recording(options, plan),
-        pushes=pushes,
-        throws=throws,
-        velocities=planned.velocities,
+        inputs=planned.inputs,
     )
     has_states = throws and not options.no_record
     return describe_hits(plan, throws, read_states(directory) if has_states else None)
-
-
-def _reference(options: argparse.Namespace) -> dict[str, object]:
-    """The controller's parameters of what is tracked."""
-    for kind in ("clip", "keyframes"):
-        name = getattr(options, kind)
-        if name is not None:
-            return {"reference": kind, kind: name}
-    reference = options.reference if options.cmd_vel is None else "steered"
-    return {} if reference is None else {"reference": reference}
-
-
-def _pushes(texts: list[str], plan: "RunPlan", found_in: "FoundWith | None") -> "list[PlannedPush]":
-    """Those of `--push`; without any, those with which a reconstruction was found."""
-    from actuated_characters.runs.planned.wrenches import parse_push, parse_pushes_within
-
-    if _NO_PUSH in texts:
-        if set(texts) != {_NO_PUSH}:
-            raise ConfigurationError(f"--push {_NO_PUSH} goes with no other --push")
-        return []
-    if texts or found_in is None:
-        return [parse_push(text, plan) for text in texts]
-    return parse_pushes_within(found_in.pushes, plan)
-
-
-def _set_option(name: str, value: str | None, controller: dict[str, object]) -> None:
-    """Set the parameter of an option. Raises ConfigurationError if `--set` has another value."""
-    if value is not None and controller.setdefault(name, value) != value:
-        raise ConfigurationError(
-            f"--{name} is {value}, and --set controller_node.{name} is {controller[name]}; "
-            "give one of them"
-        )

@@ -18,6 +18,7 @@ from actuated_characters.replay.players.character_files import (
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import Progress, run_in_process
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
@@ -46,8 +47,7 @@ def run_fork(
         write_bag=True,
         progress=lambda ticks: progress(max(ticks - fork.skipped, 0)),
         recording={KEY: fork.origin.to_json(), "sensors": list(fork.sensors)},
-        pushes=fork.pushes,
-        throws=fork.throws,
+        inputs=PlannedInputs(fork.pushes, fork.throws),
         fork=fork.node,
         resets=fork.resets,
     )

@@ -97,7 +97,7 @@ def plan_fork(
     stops = recorded_stops(recording, point).values()
     plan = _run_plan(past, point.ticks)
     settings = _checked_settings(recording, plan, inputs.settings)
-    whole = _lasting(plan, past.skipped + point.ticks)
+    whole = plan.lasting(past.skipped + point.ticks)
     pushes = [past.at_stamp_of_run(parse_push(text, whole)) for text in inputs.pushes]
     planned, warnings = plan_throws(whole, inputs.throws)
     throws = [past.at_stamp_of_run(throw) for throw in planned]
@@ -233,11 +233,6 @@ def _recorded_sensors(path: Path, recording: Recording) -> list[str]:
     recorded = read_metadata(bag).topics if bag.is_dir() else ()
     names = {name.lstrip("/") for name in recorded}
     return [each.topic for each in recording.character.sensors if each.topic in names]
-
-
-def _lasting(plan: RunPlan, ticks: int) -> RunPlan:
-    """A plan with another number of ticks."""
-    return replace(plan, simulator=Values({**plan.simulator, "max_ticks": ticks}))
 
 
 def _run_plan(past: _Past, ticks: int) -> RunPlan:

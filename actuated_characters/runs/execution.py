@@ -9,9 +9,7 @@ from pathlib import Path
 from actuated_characters.recorder.run_directory import LOGS, write_parameters
 from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned.throws import PlannedThrow
-from actuated_characters.runs.planned.velocities import PlannedVelocity
-from actuated_characters.runs.planned.wrenches import PlannedPush
+from actuated_characters.runs.planned.inputs import NO_INPUTS, PlannedInputs
 from actuated_characters.runs.processes import Child, Children, Member
 from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.senders import check_recorded, plan_senders
@@ -40,9 +38,7 @@ def run_over_topics(
     write_bag: bool,
     progress: Progress = lambda ticks: None,
     recording: Mapping[str, object] = _NOTHING_GIVEN,
-    pushes: Sequence[PlannedPush] = (),
-    throws: Sequence[PlannedThrow] = (),
-    velocities: Sequence[PlannedVelocity] = (),
+    inputs: PlannedInputs = NO_INPUTS,
     composed: bool = False,
     fork: Mapping[str, object] | None = None,
     resets: int = 0,
@@ -51,8 +47,8 @@ def run_over_topics(
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
     Without a bag the recorder is a thread of this process. With `composed`, controller and
-    simulator are one process. `recording` has parameters of the recorder. Pushes, throws and
-    velocities are sent by one more process; in lockstep all are there before the first tick. With
+    simulator are one process. `recording` has parameters of the recorder. `inputs` are sent by
+    one more process; in lockstep all are there before the first tick. With
     parameters of the node `fork` that process repeats a recording, with so many resets. With those
     of a `viewer` one more shows the characters in a browser.
 
@@ -63,8 +59,7 @@ def run_over_topics(
     recording = {**recording, **about}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
-    senders = plan_senders(directory, planned, recording, fork)
+    senders = plan_senders(directory, inputs, recording, fork)
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
@@ -80,8 +75,7 @@ def run_over_topics(
         wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
-    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
-    check_recorded(directory, plan.ticks - resets, counts)
+    check_recorded(directory, plan.ticks - resets, inputs if fork is None else None)
 
 
 def _start_measuring(

@@ -1,7 +1,7 @@
 """Runs in this process, without ROS: the nodes of a run over topics, on a bus of their own."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -11,9 +11,7 @@ from actuated_characters.recorder.run_directory import LOGS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
 from actuated_characters.runs.perturbation_node import PerturbationNode
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned.throws import PlannedThrow
-from actuated_characters.runs.planned.velocities import PlannedVelocity
-from actuated_characters.runs.planned.wrenches import PlannedPush
+from actuated_characters.runs.planned.inputs import NO_INPUTS, PlannedInputs
 from actuated_characters.runs.senders import check_recorded, plan_senders
 from controller_node.node import ControllerNode
 from msgs_config.bus.composition import ComposableNode, run_nodes
@@ -85,9 +83,7 @@ def run_in_process(
     write_bag: bool = True,
     progress: Progress = lambda ticks: None,
     recording: Mapping[str, object] = _NOTHING_GIVEN,
-    pushes: Sequence[PlannedPush] = (),
-    throws: Sequence[PlannedThrow] = (),
-    velocities: Sequence[PlannedVelocity] = (),
+    inputs: PlannedInputs = NO_INPUTS,
     fork: Mapping[str, object] | None = None,
     resets: int = 0,
     make_sender: Callable[[BusNode], ComposableNode] = PerturbationNode,
@@ -109,8 +105,7 @@ def run_in_process(
                 "services are in this process alone; set it to abort"
             )
     recording = {**recording, "directory": str(directory), "write_bag": write_bag}
-    planned = {"pushes": pushes, "throws": throws, "velocities": velocities}
-    senders = plan_senders(directory, planned, recording, fork)
+    senders = plan_senders(directory, inputs, recording, fork)
     given: dict[str, Mapping[str, object]] = {
         "recorder": {**recording, "progress_period": _PROGRESS_PERIOD},
         **senders,
@@ -131,8 +126,7 @@ def run_in_process(
         progress,
         makers=dict.fromkeys(senders, make_sender),
     )
-    counts = {"pushes": len(pushes), "throws": len(throws)} if fork is None else {}
-    check_recorded(directory, plan.ticks - resets, counts)
+    check_recorded(directory, plan.ticks - resets, inputs if fork is None else None)
 
 
 @contextmanager

@@ -1,9 +1,10 @@
-"""`pusher`: sends pushes, throws and velocities that were planned before a run."""
+"""`pusher`: sends pushes, throws, velocities and strengths that were planned before a run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.velocities import read_velocities
 from actuated_characters.runs.planned.wrenches import read_pushes
@@ -23,11 +24,13 @@ class PerturbationSettings(Settings):
     file: str = parameter("pushes.json", "the pushes, as a run writes them")
     throws: str = parameter("", "the throws, as a run writes them; empty: none")
     velocities: str = parameter("", "the velocities, as a run writes them; empty: none")
+    strengths: str = parameter("", "the strengths, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(
         1, "send when this many subscribe to external_wrench", maximum=1000
     )
     throw_subscribers: int = parameter(1, "likewise to throw", maximum=1000)
     velocity_subscribers: int = parameter(1, "likewise to cmd_vel_stamped", maximum=1000)
+    strength_subscribers: int = parameter(1, "likewise to controller_node/strength", maximum=1000)
     session: GivenSession = GivenSession()
 
 
@@ -41,7 +44,7 @@ class PerturbationNode(ComposableNode):
     """
 
     def __init__(self, node: BusNode | None = None) -> None:
-        """Read the pushes, the throws and the velocities.
+        """Read the pushes, the throws, the velocities and the strengths.
 
         Without a place on a bus it is a node of ROS.
 
@@ -78,6 +81,16 @@ class PerturbationNode(ComposableNode):
                     topics.CMD_VEL_STAMPED,
                     [each.encode() for each in velocities],
                     settings.velocity_subscribers,
+                )
+            )
+        if settings.strengths:
+            strengths = read_strengths(Path(settings.strengths))
+            self._outgoing.append(
+                _PlannedPublisher(
+                    self.node,
+                    topics.STRENGTH.of(topics.CONTROLLER_NODE),
+                    [each.encode() for each in strengths],
+                    settings.strength_subscribers,
                 )
             )
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from controller_node import parameters as controller_parameters
 from controller_node.behaviours.factory import (
@@ -19,6 +19,7 @@ from controller_node.references.base import Motion, Reference
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
 from controller_node.references.keyframes import KeyframesSettings
+from controller_node.references.timeline.motion import TimelineSettings
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
@@ -79,7 +80,13 @@ class RunPlan:
         kind = MotionSettings.of(self.controller).reference
         if kind == "keyframes":
             return KeyframesSettings.of(self.controller).keyframes
+        if kind == "timeline":
+            return TimelineSettings.of(self.controller).timeline
         return ClipSettings.of(self.controller).clip if kind == "clip" else kind
+
+    def lasting(self, ticks: int) -> "RunPlan":
+        """The same with another number of ticks."""
+        return replace(self, simulator=Values({**self.simulator, "max_ticks": ticks}))
 
     @property
     def simulation(self) -> SimulationSettings:
@@ -151,18 +158,18 @@ def _with_reference(
 
 
 def choose_reference(given: Mapping[str, object]) -> dict[str, object]:
-    """The parameter `reference` that a clip, keyframes or a state machine among parameters mean.
+    """The parameter `reference` that a clip, keyframes, a timeline or a machine mean.
 
     Raises:
-        ConfigurationError: both are given, or a clip or keyframes beside another reference.
+        ConfigurationError: two of them are given, or one beside another reference.
     """
-    kinds = [name for name in ("clip", "keyframes") if given.get(name)]
+    kinds = [name for name in ("clip", "keyframes", "timeline") if given.get(name)]
     chosen = given.get("reference")
     if not kinds:
         steered = given.get("behaviour") == STATE_MACHINE and chosen is None
         return {"reference": "steered"} if steered else {}
-    if len(kinds) == 2 and chosen not in kinds:
-        raise ConfigurationError("'clip' and 'keyframes' are given; give one of them")
+    if len(kinds) > 1 and chosen not in kinds:
+        raise ConfigurationError(f"'{kinds[0]}' and '{kinds[1]}' are given; give one of them")
     if chosen is not None and chosen not in kinds:
         raise ConfigurationError(
             f"'{kinds[0]}' is given, but parameter 'reference' is {chosen}; leave out one of them"

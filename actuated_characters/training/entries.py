@@ -14,7 +14,6 @@ from actuated_characters.runs.plan import RunPlan
 from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.references import TrainedReference
 from controller_node.behaviours.motion_library import MotionLibrary
-from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.reaction_factory import LYING_PART
 from controller_node.behaviours.settings import ReactionSettings
 from controller_node.behaviours.targets import ClipTarget
@@ -24,6 +23,7 @@ from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.settings import PlannerParameters
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
+from controller_node.references.posture import Posture
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray

@@ -10,6 +10,7 @@ from actuated_characters.render.movie import Movie, MovieSettings
 from actuated_characters.render.stills import save_png, strip
 from actuated_characters.report.metrics_plot import plot_metrics
 from actuated_characters.runs.in_process import run_in_process
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.training.exercises import Exercise
 from msgs_config.runtime.extras import PACKAGES
 
@@ -45,7 +46,7 @@ def keep_run(
         plan,
         directory,
         progress=lambda ticks: progress(0.3 * ticks / plan.ticks),
-        velocities=velocities,
+        inputs=PlannedInputs(velocities=velocities),
     )
     plot_metrics(directory)
     recordings = read_recordings(directory)

@@ -16,7 +16,6 @@ from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, 
 from controller_node.behaviours.compliance import ReactionGains
 from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
 from controller_node.behaviours.motion_library import Match, MotionLibrary
-from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.settings import ReactionSettings
 from controller_node.behaviours.targets import (
     ClipTarget,
@@ -27,6 +26,7 @@ from controller_node.behaviours.targets import (
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
+from controller_node.references.posture import Posture
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel

@@ -6,11 +6,11 @@ import numpy as np
 
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.motion_library import MotionLibrary
-from controller_node.behaviours.posture import Posture
 from controller_node.behaviours.pursuit import Pursuit, PursuitSettings, pursuit_settings
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.settings import ReactionSettings, reaction_settings
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
+from controller_node.references.posture import Posture
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.parameters import Values

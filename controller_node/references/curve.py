@@ -141,6 +141,47 @@ def segment_offsets(layout: JointLayout, configurations: GeneralizedPosition) ->
     )
 
 
+def smooth_knots(
+    layout: JointLayout, times: FloatArray, configurations: GeneralizedPosition, *, loops: bool
+) -> Knots:
+    """Knots whose curve is continuous to the acceleration.
+
+    At a configuration it moves as the parabola through this one and its two neighbours does, at the
+    two ends of what is no loop it is at rest. The last configuration of a loop is its first one.
+    """
+    durations = np.diff(times)[:, np.newaxis]
+    slopes = segment_offsets(layout, configurations) / durations
+    return Knots(times, configurations, *_parabolas(slopes, durations, loops=loops))
+
+
+def _parabolas(
+    slopes: FloatArray, durations: FloatArray, *, loops: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Velocity and acceleration (p, n) at each knot, from slopes (p - 1, n) between them.
+
+    They are in exponential coordinates about the knot, where what leads back to the knot before is
+    the negative of what leads from there.
+    """
+    if loops:
+        before, after = np.roll(slopes, 1, axis=0), slopes
+        time_before, time_after = np.roll(durations, 1, axis=0), durations
+    else:
+        before, after = slopes[:-1], slopes[1:]
+        time_before, time_after = durations[:-1], durations[1:]
+    both = time_before + time_after
+    velocities = (before * time_after + after * time_before) / both
+    accelerations = 2.0 * (after - before) / both
+    if loops:
+        return closed(velocities), closed(accelerations)
+    ends = ((1, 1), (0, 0))  # zeros before and after: at rest at both ends
+    return np.pad(velocities, ends), np.pad(accelerations, ends)
+
+
+def closed(rows: FloatArray) -> FloatArray:
+    """The rows, with the first once more at the end."""
+    return np.concatenate([rows, rows[:1]])
+
+
 def _coefficients(layout: JointLayout, knots: Knots) -> FloatArray:
     """Coefficients (p - 1, 5, n) of u, u^2, ... where u goes from 0 to 1 over each segment."""
     ends = segment_offsets(layout, knots.configurations)

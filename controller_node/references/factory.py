@@ -3,6 +3,7 @@
 from controller_node.references import clip, hold, keyframes, signals  # noqa: F401  register their own
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.steering import factory as steering  # noqa: F401  registers its own
+from controller_node.references.timeline import motion  # noqa: F401  registers its own
 from msgs_config.character.model import Character
 from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
@@ -13,8 +14,8 @@ class MotionSettings(Settings):
 
     reference: str = parameter(
         "hold",
-        "what to track: the rest pose, keyframes, a motion clip, a test signal from the rest "
-        "pose, or a walk steered by cmd_vel; a message on ~/joint_trajectory replaces it",
+        "what to track: the rest pose, keyframes, a timeline, a motion clip, a test signal from "
+        "the rest pose, or a walk steered by cmd_vel; a message on ~/joint_trajectory replaces it",
         choices=REFERENCES.names,
     )
 

@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion, ReferenceState
-from controller_node.references.curve import Curve, Knots, segment_offsets
+from controller_node.references.curve import Curve, Knots, closed, smooth_knots
 from controller_node.references.files.keyframes import Keyframes, read_keyframes
 from controller_node.references.limits import JointLimits
-from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character
 from msgs_config.errors import MotionError, one_of
@@ -47,49 +46,18 @@ class KeyframesReference:
 def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
     """The path through keyframes; that of a loop is one period, from its first keyframe on.
 
-    A smooth path is continuous to the acceleration. At a keyframe it moves as the parabola through
-    this one and its two neighbours does, at the two ends of what is no loop it is at rest.
+    A smooth path is continuous to the acceleration; `smooth_knots` says how it moves.
     """
     times, configurations = keyframes.times, keyframes.configurations
     if keyframes.period is not None:
         times = np.append(times - times[0], keyframes.period)
         configurations = GeneralizedPosition(
-            _closed(configurations.position), _closed(configurations.orientations_xyzw)
+            closed(configurations.position), closed(configurations.orientations_xyzw)
         )
     if not keyframes.smooth or len(times) == 1:
         return Curve(layout, Knots(times, configurations))
-    durations = np.diff(times)[:, np.newaxis]
-    slopes = segment_offsets(layout, configurations) / durations
-    rates = _parabolas(slopes, durations, loops=keyframes.period is not None)
-    return Curve(layout, Knots(times, configurations, *rates))
-
-
-def _closed(rows: FloatArray) -> FloatArray:
-    """The rows, with the first once more at the end."""
-    return np.concatenate([rows, rows[:1]])
-
-
-def _parabolas(
-    slopes: FloatArray, durations: FloatArray, *, loops: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Velocity and acceleration (p, n) at each knot, from slopes (p - 1, n) between them.
-
-    They are in exponential coordinates about the knot, where what leads back to the knot before is
-    the negative of what leads from there.
-    """
-    if loops:
-        before, after = np.roll(slopes, 1, axis=0), slopes
-        time_before, time_after = np.roll(durations, 1, axis=0), durations
-    else:
-        before, after = slopes[:-1], slopes[1:]
-        time_before, time_after = durations[:-1], durations[1:]
-    both = time_before + time_after
-    velocities = (before * time_after + after * time_before) / both
-    accelerations = 2.0 * (after - before) / both
-    if loops:
-        return _closed(velocities), _closed(accelerations)
-    ends = ((1, 1), (0, 0))  # zeros before and after: at rest at both ends
-    return np.pad(velocities, ends), np.pad(accelerations, ends)
+    loops = keyframes.period is not None
+    return Curve(layout, smooth_knots(layout, times, configurations, loops=loops))
 
 
 def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.runs.in_process import run_in_process
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throws import plan_throws
 from actuated_characters.runs.planned.wrenches import PlannedPush
 from lecture.framework.study import RunResult, RunSpec
@@ -52,9 +53,7 @@ class Runner:
                 directory,
                 progress=lambda ticks: self._report(case.label, min(ticks / plan.ticks, 1.0)),
                 recording={"exclude": _UNREAD if case.contacts else [*_UNREAD, "contacts"]},
-                pushes=case.pushes,
-                throws=throws,
-                velocities=velocities,
+                inputs=PlannedInputs(case.pushes, throws, velocities),
             )
         except SimulationError as error:
             if _DIVERGED not in str(error):

@@ -22,7 +22,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from actuated_characters.commands.run import add_run, planned_run
+from actuated_characters.commands.common.planned_run import planned_run
+from actuated_characters.commands.run import add_run
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.in_process import run_in_process
 from sim_node.physics.engine import INSTALLED_ENGINES
@@ -84,9 +85,7 @@ def summary_here(arguments: str, folder: Path) -> dict[str, Any]:
         run.plan,
         folder,
         write_bag=False,
-        pushes=run.pushes,
-        throws=run.throws,
-        velocities=run.velocities,
+        inputs=run.inputs,
     )
     return _summary_in(folder)
 

@@ -13,6 +13,7 @@ from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.inputs import NO_INPUTS, PlannedInputs
 from tests.support.ros import Process, Processes, wait_until
 
 FAMILY = "ACTUATED_CHARACTERS_TEST"
@@ -88,21 +89,21 @@ def parameters_of(directory: Path, node: str) -> dict[str, Any]:
     return dict(content[node]["ros__parameters"])
 
 
-def run_plan_here(plan: RunPlan, directory: Path, **inputs: Any) -> None:
+def run_plan_here(plan: RunPlan, directory: Path, inputs: PlannedInputs = NO_INPUTS) -> None:
     """Run a plan in the test's own process, whose bag is that of a run over topics."""
     prepare_directory(directory, overwrite=False)
-    run_in_process(plan, directory, **inputs)
+    run_in_process(plan, directory, inputs=inputs)
 
 
-def run_plan(plan: RunPlan, directory: Path, mark: str = "", **inputs: Any) -> int:
+def run_plan(plan: RunPlan, directory: Path, mark: str = "", **options: Any) -> int:
     """Run a plan over topics on a domain of its own; the most of its marked processes at once."""
     prepare_directory(directory, overwrite=False)
     alive = [0]
-    inputs.setdefault("write_bag", True)
+    options.setdefault("write_bag", True)
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("ROS_DOMAIN_ID", raising=False)
         patch.setenv(FAMILY, mark)
         run_over_topics(
-            plan, directory, progress=lambda _: alive.append(len(family(mark))), **inputs
+            plan, directory, progress=lambda _: alive.append(len(family(mark))), **options
         )
     return max(alive)

@@ -17,6 +17,7 @@ OVERVIEW = {
     'run --machine walk --cmd-vel "0.9,0,0.3@1" --duration 10': "walks by laws of balance",
     "motion import my_capture.bvh": "a clip of your own capture, for --clip",
     "run --clip walk --duration 20 --planner hybrid": "a recorded run, and its figures",
+    "run --timeline wave": "poses, pushes and steering in time, from a file",
     "run --view --clip run --planner policy": "in the browser, as any run with --view",
     "run --clip backflip --duration 1.75 --planner predictive": "by joint torques alone",
     "run --parameters controller_node": "all that --set can set of a node",

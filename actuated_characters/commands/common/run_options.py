@@ -22,10 +22,17 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
     tracked.add_argument(
         "--keyframes", help="track these keyframes: a shipped name or a .yaml file"
     )
+    tracked.add_argument(
+        "--timeline",
+        metavar="FILE",
+        help="do what this timeline says, a shipped name or a .yaml file: poses, clips and "
+        "steering in time, pushes, balls and strengths; --character, --duration, --set and other "
+        "options take precedence",
+    )
     add_choice(
         tracked,
         "--reference",
-        ParameterChoices(_CONTROLLER, "reference", without=("clip", "keyframes")),
+        ParameterChoices(_CONTROLLER, "reference", without=("clip", "keyframes", "timeline")),
         help="the rest pose (hold, the default), a test signal from it, or a walk steered by the "
         "topic cmd_vel",
     )

@@ -77,13 +77,15 @@ def print_remarks(recordings: "Sequence[Recording]") -> None:
             print(f"note: {remark}", file=sys.stderr)
 
 
-def add_character(command: argparse.ArgumentParser) -> None:
-    """Add the option that names a character."""
+def add_character(
+    command: argparse.ArgumentParser, default: str | None = CHARACTER, about: str = CHARACTER
+) -> None:
+    """Add the option that names a character; `about` says which one it is without it."""
     command.add_argument(
         "--character",
-        default=CHARACTER,
+        default=default,
         metavar="NAME",
-        help="name, or path of a .yaml, .urdf or .xacro file (%(default)s)",
+        help=f"name, or path of a .yaml, .urdf or .xacro file ({about})",
     )
 
 

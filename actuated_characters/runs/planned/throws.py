@@ -10,7 +10,7 @@ import numpy as np
 
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.files import Planned, read_planned
-from controller_node.behaviours.posture import Posture
+from controller_node.references.posture import Posture
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError, one_of

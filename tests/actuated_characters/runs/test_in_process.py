@@ -9,11 +9,12 @@ import pytest
 import yaml
 
 from actuated_characters.bags.recording import read_recording
-from actuated_characters.commands.run import PlannedRun
+from actuated_characters.commands.common.planned_run import PlannedRun
 from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned.inputs import NO_INPUTS, PlannedInputs
 from actuated_characters.runs.planned.throws import plan_throws
 from actuated_characters.runs.planned.velocities import plan_velocities
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
@@ -30,25 +31,25 @@ BALL = "mass=3 speed=8 at=0.3 target=chest"
 
 def pushed_walk() -> PlannedRun:
     plan = make_plan("humanoid", 0.5, WALK, {}, {})
-    return PlannedRun(plan, [parse_push("chest:150,0,0@0.2", plan)], (), (), ())
+    return PlannedRun(plan, PlannedInputs([parse_push("chest:150,0,0@0.2", plan)]), ())
 
 
 def reactive_pushed_with_a_ball() -> PlannedRun:
     plan = make_plan("humanoid", 0.8, WALK, {}, {"behaviour": "reactive"})
     throws, _ = plan_throws(plan, [BALL])
-    return PlannedRun(plan, [parse_push("chest:150,0,0@0.2", plan)], throws, (), ())
+    return PlannedRun(plan, PlannedInputs([parse_push("chest:150,0,0@0.2", plan)], throws), ())
 
 
 def steered_machine() -> PlannedRun:
     plan = make_plan("humanoid", 0.8, {}, {}, {"behaviour": "state_machine", "machine": "walk"})
     plan, velocities = plan_velocities(plan, "0.8,0,0.2@0.1")
-    return PlannedRun(plan, (), (), velocities, ())
+    return PlannedRun(plan, PlannedInputs(velocities=velocities), ())
 
 
 def planned_backflip() -> PlannedRun:
     quickly = {"planner": "predictive", "plan.samples": 8, "plan.rounds": 1}
     plan = make_plan("humanoid", 0.3, {"reference": "clip", "clip": "backflip"}, {}, quickly)
-    return PlannedRun(plan, (), (), (), ())
+    return PlannedRun(plan, NO_INPUTS, ())
 
 
 def in_process(run: PlannedRun, directory: Path) -> Path:
@@ -58,9 +59,7 @@ def in_process(run: PlannedRun, directory: Path) -> Path:
         run.plan,
         directory,
         recording=recording_of(run.plan),
-        pushes=run.pushes,
-        throws=run.throws,
-        velocities=run.velocities,
+        inputs=run.inputs,
     )
     return directory
 
@@ -80,9 +79,7 @@ def test_the_messages_are_those_of_a_run_over_topics(
         planned.plan,
         tmp_path / "sent",
         recording=recording_of(planned.plan),
-        pushes=planned.pushes,
-        throws=planned.throws,
-        velocities=planned.velocities,
+        inputs=planned.inputs,
     )
 
     assert_same_messages(alone / "bag", tmp_path / "sent" / "bag")
@@ -177,7 +174,7 @@ def test_an_input_that_the_simulator_rejects_is_said(tmp_path: Path) -> None:
     beyond = PlannedPush(TickClock(240).stamp_ns(5), "tail", (1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
     with pytest.raises(RunError, match="sim_node rejected 1 of 1 pushes"):
-        run_in_process(plan, tmp_path / "run", pushes=[beyond])
+        run_in_process(plan, tmp_path / "run", inputs=PlannedInputs([beyond]))
 
     assert "push refused: " in (tmp_path / "run" / "logs" / "sim_node.log").read_text()
 

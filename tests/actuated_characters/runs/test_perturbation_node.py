@@ -15,6 +15,7 @@ from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throws import PlannedThrow, read_throws
 from actuated_characters.runs.planned.wrenches import (
     PlannedPush,
@@ -100,7 +101,7 @@ class Made:
 @pytest.fixture(scope="module")
 def pushed(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory, mark = tmp_path_factory.mktemp("pushed") / "run", uuid.uuid4().hex
-    most_alive = run_plan(plan_of(), directory, mark, pushes=PLANNED)
+    most_alive = run_plan(plan_of(), directory, mark, inputs=PlannedInputs(PLANNED))
     summary, _ = read_metrics(directory)
     return Made(directory, read_recording(directory), summary, most_alive, len(family(mark)))
 
@@ -149,7 +150,7 @@ def test_the_states_are_those_of_one_process_with_the_same_pushes_to_the_bit(pus
 def test_a_run_in_one_process_takes_the_same_pushes(pushed: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
-    run_in_process(plan_of(), tmp_path / "run", pushes=PLANNED)
+    run_in_process(plan_of(), tmp_path / "run", inputs=PlannedInputs(PLANNED))
 
     summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == pushed.summary["state_hash"]

@@ -16,6 +16,7 @@ from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throw_hits import (
     States,
     describe_hits,
@@ -253,7 +254,7 @@ def thrown(tmp_path_factory: pytest.TempPathFactory) -> Made:
     directory = tmp_path_factory.mktemp("thrown") / "run"
     plan = make_plan("humanoid", 0.75, WALK, {"ball_lifetime": 0.25}, {"behaviour": "reactive"})
     throws, _ = plan_throws(plan, THROWN)
-    run_plan(plan, directory, throws=throws)
+    run_plan(plan, directory, inputs=PlannedInputs(throws=throws))
     summary, _ = read_metrics(directory)
     return Made(plan, throws, directory, read_recording(directory), summary)
 
@@ -277,7 +278,7 @@ def test_the_bag_says_what_was_thrown_and_where_it_went(thrown: Made) -> None:
 def test_a_run_in_one_process_takes_the_same_throws(thrown: Made, tmp_path: Path) -> None:
     prepare_directory(tmp_path / "run", overwrite=False)
 
-    run_in_process(thrown.plan, tmp_path / "run", throws=thrown.throws)
+    run_in_process(thrown.plan, tmp_path / "run", inputs=PlannedInputs(throws=thrown.throws))
 
     summary, _ = read_metrics(tmp_path / "run")
     assert summary["state_hash"] == thrown.summary["state_hash"]
@@ -386,7 +387,7 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
     throws, _ = plan_throws(plan, ["mass=1 speed=10 at=0.2 distance=1 target=neck radius=0.05"])
     pushes = [plan_push(plan, "chest", (10.0, 0.0, 0.0), 0.1)]
 
-    run_plan(plan, directory, write_bag=False, pushes=pushes, throws=throws)
+    run_plan(plan, directory, write_bag=False, inputs=PlannedInputs(pushes, throws))
 
     summary, _ = read_metrics(directory)
     assert summary["ticks"] == 60
@@ -394,6 +395,6 @@ def test_without_a_bag_nobody_waits_for_a_recorder_of_pushes_and_throws(tmp_path
     with_both = [tick.following for tick in ticks_in_process(plan, pushes, throws)]
     with_one = [tick.following for tick in ticks_in_process(plan, pushes)]
     assert not np.array_equal(with_both[-1].position, with_one[-1].position)  # it has hit
-    run_in_process(plan, directory, pushes=pushes, throws=throws)
+    run_in_process(plan, directory, inputs=PlannedInputs(pushes, throws))
     again, _ = read_metrics(directory)
     assert again["state_hash"] == summary["state_hash"]

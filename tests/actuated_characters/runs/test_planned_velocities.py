@@ -9,6 +9,7 @@ from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.runs.plan import RunPlan, make_plan
 from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.velocities import (
     PlannedVelocity,
     plan_velocities,
@@ -107,7 +108,7 @@ def test_a_steered_run_is_replayed_to_the_bit(
 ) -> None:
     plan, planned = plan_velocities(plan_of(1.2), "0.8,0.1,0.5@0.2 0,0,0@0.8")
 
-    run_plan_here(plan, tmp_path / "run", velocities=planned)
+    run_plan_here(plan, tmp_path / "run", PlannedInputs(velocities=planned))
 
     recording = read_recording(tmp_path / "run")
     assert recording.position[-1, 0] - recording.position[0, 0] > 0.2

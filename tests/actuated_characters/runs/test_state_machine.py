@@ -12,6 +12,7 @@ from actuated_characters.replay.through_topics import replay_states
 from actuated_characters.report.events import mode_events
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.velocities import PlannedVelocity, plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
 from lecture.athletics.measures import longest_flight
@@ -32,7 +33,7 @@ def test_a_run_is_replayed_to_the_bit(tmp_path: Path, monkeypatch: pytest.Monkey
     plan, velocities = planned()
     push = parse_push("root:60,0,0@1.1", plan)
 
-    run_plan_here(plan, tmp_path / "run", velocities=velocities, pushes=[push])
+    run_plan_here(plan, tmp_path / "run", PlannedInputs([push], velocities=velocities))
 
     recording = read_recording(tmp_path / "run")
     assert recording.position[-1, 0] - recording.position[0, 0] > 0.2
@@ -52,9 +53,9 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
     push = parse_push("root:20,-10,0@1.4", plan)
     alone, sent = tmp_path / "alone", tmp_path / "sent"
     prepare_directory(alone, overwrite=False)
-    run_in_process(plan, alone, pushes=[push])
+    run_in_process(plan, alone, inputs=PlannedInputs([push]))
 
-    run_plan(plan, sent, pushes=[push], recording={"exclude": []})
+    run_plan(plan, sent, inputs=PlannedInputs([push]), recording={"exclude": []})
 
     assert summary_of(sent)["state_hash"] == summary_of(alone)["state_hash"]
     recording = read_recording(sent)

@@ -7,9 +7,9 @@ from actuated_characters.training.entries import FALL, Entries
 from actuated_characters.training.exercises import Exercise
 from actuated_characters.training.job import make_job
 from actuated_characters.training.references import TrainedReference
-from controller_node.behaviours.posture import Posture
 from controller_node.references.base import ReferenceState
 from controller_node.references.clip import ClipReference
+from controller_node.references.posture import Posture
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.geometry import rotations

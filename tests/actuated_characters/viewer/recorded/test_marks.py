@@ -9,6 +9,7 @@ import pytest
 from actuated_characters.bags.recording import read_recording
 from actuated_characters.render.scene import make_scene
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import parse_push
@@ -36,7 +37,7 @@ def stands(tmp_path_factory: pytest.TempPathFactory) -> Path:
     balls = ((EARLIER, ROLLS), (AT, HITS))
     throws = [PlannedThrow((tick + 1) * STEP_NS, each) for tick, each in balls]
     pushes = [parse_push("root:0,60,0@0.2", plan)]
-    run_plan_here(plan, directory, pushes=pushes, throws=throws)
+    run_plan_here(plan, directory, PlannedInputs(pushes, throws))
     return directory
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.wrenches import parse_push
 from tests.actuated_characters.viewer.test_browser import SOON, address_of
 from tests.support.browser import SHIFT, Browser, needs_chromium
@@ -21,7 +22,7 @@ def make_walk(directory: Path) -> Path:
     """One second, 240 ticks, with a push from 0.5 to 0.6 s."""
     reference, simulator = {"reference": "clip", "clip": "walk"}, {"wrench_duration": 0.1}
     plan = make_plan("humanoid", 1.0, reference, simulator, {"root_assistance": True})
-    run_plan_here(plan, directory, pushes=[parse_push(PUSH, plan)])
+    run_plan_here(plan, directory, PlannedInputs([parse_push(PUSH, plan)]))
     return directory
 
 

@@ -1,0 +1,138 @@
+"""What a timeline's file says beside the motion: how it is run, and what is sent, and when."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from actuated_characters.runs.plan import SHARED, RunPlan
+from actuated_characters.runs.planned.strengths import PlannedStrengths
+from actuated_characters.runs.planned.throws import PlannedThrow, parse_throw, plan_throw
+from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push
+from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
+from controller_node.references.timeline.description import (
+    Entry,
+    PushEntry,
+    StrengthEntry,
+    Timeline,
+)
+from controller_node.references.timeline.motion import TimelineReference
+from msgs_config.character.model import Character
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError, MotionError, one_of
+from msgs_config.messages.clock import TickClock
+from sim_node.node_settings import NodeSettings
+
+_AFTERWARDS = 1.0  # s that a run goes on when all of a timeline is over
+
+
+@dataclass(frozen=True)
+class Events:
+    """What is sent to the nodes, each with the stamp from which on it counts."""
+
+    pushes: Sequence[PlannedPush]
+    throws: Sequence[PlannedThrow]
+    strengths: Sequence[PlannedStrengths]
+    warnings: Sequence[str]
+
+
+def set_parameters(
+    timeline: Timeline,
+    character: Character,
+    simulator: dict[str, object],
+    controller: dict[str, object],
+) -> None:
+    """Set what a timeline says of the nodes' parameters, unless it is set.
+
+    One that says no planner has `predictive` for a character that stands by itself.
+    """
+    run = dict(timeline.run)
+    if not character.layout.has_floating_base or not character.feet:
+        run.setdefault("planner", NO_PLANNER)
+    run.setdefault("planner", PREDICTIVE)
+    taken = {name for name in SHARED if name in simulator or name in controller}
+    own = timeline.settings
+    for given, brought in (
+        (simulator, own.get("sim_node", {})),
+        (controller, {**run, **own.get("controller_node", {})}),
+    ):
+        given.update({name: brought[name] for name in brought if name not in (*given, *taken)})
+
+
+def default_duration(plan: RunPlan) -> float:
+    """The length in s of a run of a timeline that says none: until all of it is over, and a bit."""
+    assert isinstance(plan.reference, TimelineReference)
+    timeline = plan.reference.timeline
+    over = [plan.reference.end]
+    over += [each.until for each in timeline.strengths]
+    over += [each.at + (each.duration or 0.0) for each in timeline.pushes]
+    over += [each.at for each in timeline.throws]
+    return max(over) + _AFTERWARDS
+
+
+def plan_events(plan: RunPlan) -> Events:
+    """The events of the timeline that a plan tracks.
+
+    Raises:
+        MotionError: names the entry that the character cannot be sent, and why.
+    """
+    assert isinstance(plan.reference, TimelineReference)
+    timeline, warnings = plan.reference.timeline, list[str]()
+    pushes = [push for entry in timeline.pushes for push in _pushes(plan, entry)]
+    throws: list[PlannedThrow] = []
+    for entry in timeline.throws:
+        text = " ".join(f"{key}={value}" for key, value in entry.request.items())
+        try:
+            throw, in_the_way = plan_throw(plan, parse_throw(text))
+        except ActuatedCharactersError as error:
+            raise MotionError(f"{entry.place}: {error}") from error
+        throws.append(throw)
+        warnings += [f"{entry.place}: {line}" for line in in_the_way]
+    return Events(pushes, throws, _strengths(plan, timeline.strengths), warnings)
+
+
+def _pushes(plan: RunPlan, entry: PushEntry) -> list[PlannedPush]:
+    """A push, as one after another of the simulator's `wrench_duration`."""
+    rate, ticks = plan.simulation.rate_hz, NodeSettings.of(plan.simulator).push_ticks
+    whole = ticks if entry.duration is None else round(entry.duration * rate)
+    if whole < ticks or whole % ticks:
+        raise MotionError(
+            f"{entry.place}: for is {entry.duration:g} s; it must be a multiple of "
+            f"{ticks / rate:g} s, the parameter sim_node.wrench_duration"
+        )
+    try:
+        first = plan_push(plan, entry.link, entry.force, entry.at)
+    except ConfigurationError as error:
+        raise MotionError(f"{entry.place}: {error}") from error
+    clock = TickClock(rate)
+    begin = clock.tick(first.stamp_ns)
+    return [
+        replace(first, stamp_ns=clock.stamp_ns(tick))
+        for tick in range(begin, begin + whole, ticks)
+        if tick <= plan.ticks
+    ]
+
+
+def _strengths(plan: RunPlan, entries: Sequence[StrengthEntry]) -> list[PlannedStrengths]:
+    """The strengths at each time at which some change; where several act, their product."""
+    rate, joints = plan.simulation.rate_hz, plan.character.layout.actuated_joint_names
+    changes: set[int] = set()
+    for entry in entries:
+        _check_within(plan, entry)
+        for name in entry.joints:
+            if name not in joints:
+                raise MotionError(f"{entry.place}: {one_of('joint', name, list(joints))}")
+        changes |= {round(entry.at * rate), round(entry.until * rate)}
+    clock, planned = TickClock(rate), list[PlannedStrengths]()
+    for tick in sorted(changes):
+        values: dict[str, float] = {}
+        for entry in entries:
+            if round(entry.at * rate) <= tick < round(entry.until * rate):
+                for name in entry.joints or joints:
+                    values[name] = values.get(name, 1.0) * entry.strength
+        if tick < plan.ticks:
+            planned.append(PlannedStrengths(clock.stamp_ns(1 + tick), values))
+    return planned
+
+
+def _check_within(plan: RunPlan, entry: Entry) -> None:
+    end = plan.ticks / plan.simulation.rate_hz
+    if entry.at >= end:
+        raise MotionError(f"{entry.place}: at is {entry.at:g} s; the run ends at {end:g} s")

@@ -1,0 +1,63 @@
+"""The reference `timeline`: the motion of a timeline's file."""
+
+from controller_node.references.base import REFERENCES, Motion, Reference, ReferenceState
+from controller_node.references.steering import factory  # noqa: F401  registers what it steers
+from controller_node.references.timeline.description import Timeline
+from controller_node.references.timeline.file import read_timeline
+from controller_node.references.timeline.ground import GroundMaker
+from controller_node.references.timeline.layers import layer_of_poses
+from msgs_config.character.model import Character
+from msgs_config.parameters import Values
+from msgs_config.settings import Settings, parameter
+
+_MOST_KNOWN = 2048  # states: many more than there are ticks in a planner's horizon
+
+
+class TimelineSettings(Settings):
+    """The timeline that is tracked."""
+
+    timeline: str = parameter(
+        "", "name of a shipped timeline, or path of a .yaml file: poses, clips and events in time"
+    )
+
+
+class TimelineReference:
+    """A timeline's motion. It remembers states, which a planner asks for again and again."""
+
+    def __init__(self, timeline: Timeline, motion: Reference, end: float) -> None:
+        """`end` is when all of the motion is over, s."""
+        self.timeline, self.end = timeline, end
+        self._motion = motion
+        self._known: dict[float, ReferenceState] = {}
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the states that are known: they are sampled again."""
+        return vars(self) | {"_known": {}}
+
+    def sample(self, time: float) -> ReferenceState:
+        """The desired state `time` seconds after the episode's first state."""
+        state = self._known.get(time)
+        if state is None:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            state = self._known[time] = self._motion.sample(time)
+        return state
+
+
+def timeline_motion(character: Character, values: Values, timeline: Timeline) -> Motion:
+    """The motion of a timeline. Raises MotionError if the character cannot do it."""
+    maker = GroundMaker(character, values, timeline)
+    motion: Reference = maker.make()
+    end = maker.end
+    for layer in timeline.layers:
+        motion = layer_of_poses(character, motion, layer)
+        end = max(end, layer.poses[-1].at + (layer.go or 0.0))
+    clamped = ", ".join(dict.fromkeys(maker.clamped))
+    warnings = (f"kept within joint limits: {clamped}",) if clamped else ()
+    return Motion(TimelineReference(timeline, motion, end), warnings)
+
+
+@REFERENCES.register("timeline", TimelineSettings)
+def _timeline(character: Character, values: Values) -> Motion:
+    path = TimelineSettings.of(values).timeline
+    return timeline_motion(character, values, read_timeline(path))

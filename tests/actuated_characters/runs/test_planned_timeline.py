@@ -1,0 +1,162 @@
+"""Runs of timelines: what they send and when, one hash however they run, and what is refused."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from actuated_characters.bags.recording import read_recording
+from actuated_characters.commands.common.planned_run import PlannedRun, planned_run
+from actuated_characters.commands.run import add_run
+from actuated_characters.replay.replay import replay
+from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.strengths import read_strengths
+from controller_node.planner.settings import PlannerParameters
+from msgs_config.errors import ActuatedCharactersError
+from msgs_config.messages.clock import TickClock
+from tests.support.runs import run_plan, run_plan_here, summary_of
+
+RATE = 240
+CLOCK = TickClock(RATE)
+ASSISTED = {"planner": "none"}
+WAVE = {"poses": [{"at": 0.3, "pose": {"right_elbow": 1.0}}]}
+EVENTFUL: dict[str, Any] = {
+    "duration": 1.0,
+    "run": ASSISTED,
+    "keys": [WAVE],
+    "clips": [{"at": 0.0, "clip": "walk"}],
+    "strengths": [{"at": 0.2, "until": 0.6, "joints": ["left_elbow", "neck"], "strength": 0.3}],
+    "pushes": [{"at": 0.5, "link": "chest", "force": [40, 0, 0], "for": 0.2}],
+    "throws": [{"at": 0.6, "mass": 1, "speed": 8, "target": "chest"}],
+}
+
+
+def planned(directory: Path, content: dict[str, Any], *options: str) -> PlannedRun:
+    file = directory / "moves.yaml"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    commands = argparse.ArgumentParser().add_subparsers()
+    add_run(commands)
+    return planned_run(commands.choices["run"].parse_args(["--timeline", str(file), *options]))
+
+
+def tick(time: float) -> int:
+    return CLOCK.stamp_ns(1 + round(time * RATE))
+
+
+@pytest.mark.slow
+def test_over_topics_in_one_process_and_from_its_bag_a_run_has_one_hash(tmp_path: Path) -> None:
+    run = planned(tmp_path, EVENTFUL)
+    alone, sent = tmp_path / "alone", tmp_path / "sent"
+
+    run_plan_here(run.plan, alone, run.inputs)
+    run_plan(run.plan, sent, inputs=run.inputs)
+
+    assert summary_of(alone)["state_hash"] == summary_of(sent)["state_hash"]
+    assert replay([read_recording(sent)]).identical
+    recording = read_recording(alone)
+    pushed = [row for row, push in enumerate(recording.applied_wrench) if push and push.links]
+    assert pushed == list(range(120, 168))  # 0.2 s, though a push is held for 0.1 s
+    elbow = recording.layout.dof_names.index("left_elbow")
+    weak = recording.effort[60:140, elbow]
+    assert np.abs(weak).max() <= 0.3 * 60.0 + 1e-9  # of the file's limit, N m
+
+
+def test_without_a_word_a_character_is_planned_for_and_what_is_said_counts(tmp_path: Path) -> None:
+    def planner(content: dict[str, Any], *options: str) -> str:
+        return PlannerParameters.of(planned(tmp_path, content, *options).plan.controller).planner
+
+    assert planner({}) == "predictive"
+    assert planner({"run": ASSISTED}) == "none"
+    assert planner({"run": ASSISTED}, "--planner", "predictive") == "predictive"
+    arm = {"character": "franka_panda"}
+    assert planner(arm) == "none"
+    given = planned(tmp_path, {**arm, "set": {"sim_node.rate": 500}})
+    assert given.plan.character.name == "franka_panda"
+    assert given.plan.simulation.rate_hz == 500
+    other = planned(tmp_path, {"run": ASSISTED}, "--set", "sim_node.friction:=0.5")
+    assert other.plan.simulator["friction"] == 0.5
+
+
+def test_it_lasts_until_all_is_over(tmp_path: Path) -> None:
+    content = {"run": ASSISTED, "limp": [{"at": 1.0, "until": 2.0}], "keys": [WAVE]}
+
+    assert planned(tmp_path, content).plan.ticks == 3 * RATE
+    assert planned(tmp_path, {**content, "duration": 5}).plan.ticks == 5 * RATE
+    assert planned(tmp_path, content, "--duration", "4").plan.ticks == 4 * RATE
+
+
+def test_strengths_that_overlap_multiply_and_are_written_and_read(tmp_path: Path) -> None:
+    content = {
+        "run": ASSISTED,
+        "limp": [{"at": 3.0, "until": 4.0}],
+        "strengths": [
+            {"at": 1.0, "until": 2.0, "joints": ["neck", "chest"], "strength": 0.5},
+            {"at": 1.5, "until": 3.5, "joints": ["neck"], "strength": 0.5},
+        ],
+    }
+
+    run = planned(tmp_path, content)
+
+    sent = {each.stamp_ns: each.strengths for each in run.inputs.strengths}
+    joints = run.plan.character.layout.actuated_joint_names
+    assert sent == {
+        tick(1.0): {"neck": 0.5, "chest": 0.5},
+        tick(1.5): {"neck": 0.25, "chest": 0.5},
+        tick(2.0): {"neck": 0.5},
+        tick(3.0): dict.fromkeys(joints, 0.0),
+        tick(3.5): dict.fromkeys(joints, 0.0),
+        tick(4.0): {},
+    }
+    write_planned(tmp_path / "strengths.json", run.inputs.strengths)
+    assert read_strengths(tmp_path / "strengths.json") == list(run.inputs.strengths)
+
+
+def test_pushes_and_balls_of_the_options_come_besides(tmp_path: Path) -> None:
+    throw = "mass=1 speed=8 at=0.7 target=neck"
+
+    run = planned(tmp_path, EVENTFUL, "--push", "chest:1,0,0@0.1", "--throw", throw)
+
+    assert [each.stamp_ns for each in run.inputs.pushes] == [tick(0.5), tick(0.6), tick(0.1)]
+    assert len(run.inputs.throws) == 2
+
+
+def test_what_is_limp_has_no_effort_until_it_is_over(tmp_path: Path) -> None:
+    content = {"run": ASSISTED, "duration": 1.0, "limp": [{"at": 0.25, "until": 0.75}]}
+    run = planned(tmp_path, content)
+
+    run_plan_here(run.plan, tmp_path / "run", run.inputs)
+
+    effort = read_recording(tmp_path / "run").effort[:, 6:]
+    moved = np.abs(effort).max(axis=1) > 0.0
+    assert moved[:60].all() and not moved[60:180].any() and moved[180:].all()
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (
+            {"pushes": [{"at": 0.1, "link": "chest", "force": [1, 0, 0], "for": 0.15}]},
+            "pushes 1: for is 0.15 s; it must be a multiple of 0.1 s, the parameter sim_node.wr",
+        ),
+        ({"pushes": [{"at": 9, "link": "chest", "force": [1, 0, 0]}]}, "pushes 1: .*time is 9"),
+        ({"pushes": [{"at": 0, "link": "ear", "force": [1, 0, 0]}]}, "pushes 1: .*'ear'"),
+        ({"throws": [{"at": 0.5, "mass": 1, "target": "chest"}]}, "throws 1: 'speed' is missing"),
+        (
+            {"strengths": [{"at": 0, "until": 1, "joints": ["ear"], "strength": 1}]},
+            "strengths 1: .*'ear'",
+        ),
+        ({"limp": [{"at": 5, "until": 6}]}, "limp 1: at is 5 s; the run ends at 1 s"),
+        ({"set": {"controller_node.lwa": 1}}, "lwa"),
+        ({"run": {"planner": "magic"}}, "magic"),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_in_a_line(
+    tmp_path: Path, content: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ActuatedCharactersError, match=sentence) as caught:
+        planned(tmp_path, {"duration": 1, "run": ASSISTED, **content})
+
+    assert "\n" not in str(caught.value)

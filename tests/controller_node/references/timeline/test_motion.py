@@ -1,0 +1,272 @@
+"""The motion of timelines: layers of poses over clips and steering, without a jump."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from controller_node import parameters as for_controller
+from controller_node.references.base import REFERENCES, ReferenceState
+from controller_node.references.clip import ClipReference
+from controller_node.references.timeline.motion import TimelineReference
+from msgs_config.clips.reading import read_clip
+from msgs_config.errors import MotionError
+from tests.support.motion import (
+    assert_consistent,
+    assert_moves_as_it_says,
+    assert_same_motion,
+    assert_same_place,
+    loaded,
+)
+
+HUMANOID, LAYOUT = loaded("humanoid")
+RATE = 240
+WAVE = {
+    "in": 0.4,
+    "out": 0.5,
+    "poses": [
+        {"at": 1.0, "pose": {"right_elbow": 0.6, **dict.fromkeys(["neck_x", "neck_y"], 0.1)}},
+        {"at": 1.5, "pose": {"right_elbow": 1.4}},
+        {"at": 2.0, "pose": {"right_elbow": 0.6}},
+    ],
+}
+WAVE["poses"][0]["pose"]["neck_z"] = 0.2  # type: ignore[index]
+ELBOW = LAYOUT.dof_names.index("right_elbow")
+NECK = [LAYOUT.dof_names.index(f"neck_{axis}") for axis in "xyz"]
+WALK = {"at": 0.5, "clip": "walk", "from": 0.2}
+
+
+def made(directory: Path, name: str = "humanoid", **tracks: Any) -> TimelineReference:
+    whole, _ = loaded(name)
+    file = directory / "moves.yaml"
+    file.write_text(yaml.safe_dump(tracks), encoding="utf-8")
+    given = {"character": name, "reference": "timeline", "timeline": str(file), "rate": RATE}
+    values = for_controller.resolve_for(whole, given)
+    reference = REFERENCES["timeline"](whole, values).reference
+    assert isinstance(reference, TimelineReference)
+    return reference
+
+
+def heading(state: ReferenceState) -> float:
+    """The way that a humanoid's root faces, rad: of its file's frame, y up and x ahead."""
+    x, y, z, w = state.configuration.orientations_xyzw[0].tolist()
+    return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+
+
+# Layers
+
+
+def test_a_layer_is_in_each_of_its_poses_when_its_time_comes(tmp_path: Path) -> None:
+    reference = made(tmp_path, keys=[WAVE])
+
+    for time, elbow in ((1.0, 0.6), (1.5, 1.4), (2.0, 0.6)):
+        position = reference.sample(time).configuration.position
+        assert position[ELBOW] == pytest.approx(elbow, abs=1e-12)
+        np.testing.assert_allclose(position[NECK], (0.1, 0.1, 0.2), atol=1e-12)
+
+
+def test_beneath_a_layer_nothing_changes(tmp_path: Path) -> None:
+    alone, layered = made(tmp_path, clips=[WALK]), made(tmp_path, clips=[WALK], keys=[WAVE])
+    others = np.setdiff1d(np.arange(LAYOUT.size), [ELBOW, *NECK])
+
+    for time in np.arange(0.0, 4.0, 0.01).tolist():
+        beneath, state = alone.sample(time), layered.sample(time)
+        for name in ("velocity", "acceleration"):
+            np.testing.assert_allclose(
+                getattr(state, name)[others], getattr(beneath, name)[others], atol=1e-12
+            )
+        apart = LAYOUT.difference(beneath.configuration, state.configuration)
+        np.testing.assert_allclose(apart[others], 0.0, atol=1e-12)
+        if time < 0.6 or time >= 2.5:
+            assert_same_motion(LAYOUT, beneath, state, atol=1e-15)
+
+
+def test_a_layer_comes_and_goes_without_a_jump_and_moves_as_it_says(tmp_path: Path) -> None:
+    # over steering at rest, since the frames of clips have jumps of their own
+    reference = made(tmp_path, keys=[WAVE])
+
+    for time in (0.6, 1.0, 1.5, 2.0, 2.5):
+        before, after = reference.sample(time - 1e-9), reference.sample(time + 1e-9)
+        assert_same_motion(LAYOUT, before, after, atol=1e-5)
+    times = np.random.default_rng(5).uniform(0.3, 2.7, 40)
+    assert_moves_as_it_says(LAYOUT, reference.sample, times.tolist(), tolerance=1e-5)
+
+
+def test_a_pose_to_rest_in_is_come_to_at_rest(tmp_path: Path) -> None:
+    poses = [{"at": t, "pose": {"right_elbow": 0.5 * t}, "ease": "rest"} for t in (1.0, 1.5, 2.0)]
+    resting, smooth = (
+        made(tmp_path, keys=[{"poses": given}])
+        for given in (poses, [{**pose, "ease": "smooth"} for pose in poses])
+    )
+
+    assert resting.sample(1.5).velocity[ELBOW] == pytest.approx(0.0, abs=1e-12)
+    assert smooth.sample(1.5).velocity[ELBOW] == pytest.approx(0.5, abs=1e-12)  # the line's slope
+    for reference in (resting, smooth):
+        assert reference.sample(1.5).configuration.position[ELBOW] == pytest.approx(0.75)
+
+
+def test_a_layer_from_the_beginning_is_there_at_once_and_one_that_never_goes_stays(
+    tmp_path: Path,
+) -> None:
+    layer = {"out": "never", "poses": [{"at": 0.2, "pose": {"right_elbow": 1.0}}]}
+    reference = made(tmp_path, keys=[layer])
+
+    for time in (0.0, 0.1, 0.2, 5.0):
+        state = reference.sample(time)
+        assert state.configuration.position[ELBOW] == 1.0
+        assert state.velocity[ELBOW] == 0.0
+
+
+def test_the_upper_of_two_layers_counts(tmp_path: Path) -> None:
+    one, two = ({"poses": [{"at": 1.0, "pose": {"right_elbow": angle}}]} for angle in (0.3, 0.9))
+
+    state = made(tmp_path, keys=[one, two]).sample(1.0)
+
+    assert state.configuration.position[ELBOW] == pytest.approx(0.9)
+
+
+def test_an_arm_on_a_table_has_poses_too(tmp_path: Path) -> None:
+    poses = [{"at": 1.0, "pose": {"panda_joint1": 0.5}}]
+    reference = made(tmp_path, "franka_panda", keys=[{"poses": poses}])
+
+    assert reference.sample(1.0).configuration.position[0] == pytest.approx(0.5)
+    assert reference.end == pytest.approx(1.3)
+
+
+# Clips and steering
+
+
+def test_a_clip_is_itself_carried_to_where_the_character_is(tmp_path: Path) -> None:
+    reference = made(tmp_path, clips=[{**WALK, "place": [2.0, -1.0], "heading": 0.7}])
+    clip = ClipReference(LAYOUT, read_clip(HUMANOID, "walk"))
+    first = clip.sample(0.2)
+
+    assert_same_place(LAYOUT, reference.sample(0.499), made(tmp_path).sample(0.0))
+    for time in (0.8, 1.3, 4.0):
+        state, own = reference.sample(time), clip.sample(0.2 + time - 0.5)
+        np.testing.assert_allclose(  # joints are those of the clip
+            state.configuration.position[6:], own.configuration.position[6:], atol=1e-9
+        )
+        turn = heading(state) - heading(own)
+        assert turn == pytest.approx(0.7 - heading(first), abs=0.01)  # it leans a little
+        cosine, sine = np.cos(turn), np.sin(turn)
+        x, y = own.configuration.position[:2] - first.configuration.position[:2]
+        place = (2.0 + cosine * x - sine * y, -1.0 + sine * x + cosine * y)
+        np.testing.assert_allclose(state.configuration.position[:2], place, atol=1e-9)
+
+
+def test_motions_go_over_into_each_other_without_a_jump(tmp_path: Path) -> None:
+    reference = made(
+        tmp_path,
+        clips=[{**WALK, "to": 1.4}, {"at": 4.5, "clip": "punch", "to": 0.8}],
+        steering=[{"at": 2.5, "until": 3.5, "velocity": [0.8, 0.0, 0.3]}],
+    )
+    ends = (0.5, 1.7, 2.5, 4.5, 5.3)
+
+    for time in ends:
+        before, after = reference.sample(time - 1e-6), reference.sample(time + 1e-6)
+        apart = LAYOUT.difference(before.configuration, after.configuration)
+        assert np.abs(apart).max() < 1e-4  # up to 50 rad/s
+    still = reference.sample(reference.end + 1.0)
+    assert not still.velocity.any() and not still.acceleration.any()
+    # a clip that was cut comes to rest where it was, within the time of its blend
+    assert not reference.sample(2.2).velocity.any()
+    moved = (
+        reference.sample(2.2).configuration.position - reference.sample(1.7).configuration.position
+    )
+    assert np.linalg.norm(moved[:2]) < 0.3
+    for time in np.arange(0.0, 6.0, 0.05).tolist():
+        assert_consistent(LAYOUT, reference.sample(time))
+
+
+def test_steering_goes_on_from_where_the_character_is_at_the_speed_that_is_said(
+    tmp_path: Path,
+) -> None:
+    reference = made(
+        tmp_path,
+        clips=[{**WALK, "place": [3.0, 1.0], "heading": 1.57, "to": 1.0}],
+        steering=[
+            {"at": 2.0, "until": 5.0, "velocity": [0.8, 0.0, 0.0]},
+            {"at": 5.0, "until": 6.0, "velocity": [1.2, 0.0, 0.0]},
+        ],
+    )
+    at = {t: reference.sample(t).configuration.position for t in (1.99, 2.0, 3.5, 5.0, 9.0, 10.0)}
+
+    assert np.linalg.norm(at[2.0] - at[1.99]) < 0.05
+    away = at[5.0] - at[3.5]
+    assert np.linalg.norm(away[:2]) == pytest.approx(0.8 * 1.5, rel=0.05)
+    assert np.arctan2(away[1], away[0]) == pytest.approx(1.57, abs=0.35)  # the clip turns a little
+    np.testing.assert_allclose(at[9.0][:2], at[10.0][:2], atol=1e-3)  # it has stopped
+    assert reference.end == 6.0
+
+
+def test_states_are_the_same_however_often_and_in_which_order_they_are_asked_for(
+    tmp_path: Path,
+) -> None:
+    tracks: dict[str, Any] = {
+        "keys": [WAVE],
+        "steering": [{"at": 0.5, "until": 1.5, "velocity": [0.5, 0.0, 0.0]}],
+    }
+    times = [tick / RATE for tick in range(0, 720, 9)]
+    forwards = made(tmp_path, **tracks)
+    wanted = [forwards.sample(time) for time in times]
+    other = made(tmp_path, **tracks)
+    order = np.random.default_rng(6).permutation(len(times)).tolist()
+
+    for row in [*order, *order]:
+        again = other.sample(times[row])
+        for name in ("velocity", "acceleration"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(wanted[row], name))
+        one, two = again.configuration, wanted[row].configuration
+        np.testing.assert_array_equal(one.position, two.position)
+        np.testing.assert_array_equal(one.orientations_xyzw, two.orientations_xyzw)
+
+
+# What it cannot do
+
+
+@pytest.mark.parametrize(
+    ("name", "tracks", "sentence"),
+    [
+        ("humanoid", {"clips": [{"at": 0, "clip": "wlak"}]}, "clips 1: .*'wlak'.*walk"),
+        (
+            "humanoid",
+            {"clips": [{"at": 0, "clip": "kick", "from": 9.0}]},
+            "clips 1: from is 9 s; clip 'kick' lasts 1.5",
+        ),
+        (
+            "franka_panda",
+            {"steering": [{"at": 0, "until": 1, "velocity": [1, 0, 0]}]},
+            "steering 1: reference 'steered' needs a floating base",
+        ),
+        (
+            "humanoid",
+            {"steering": [{"at": 0, "until": 1, "velocity": [9, 0, 0]}]},
+            r"steering 1: velocity is more than it can, which is at most \[",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{"at": 0, "pose": {"neck_x": 0.1}}]}]},
+            "keys 1: poses 1: pose: .*neck_y",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{"at": 0, "pose": {"elbow": 0.1}}]}]},
+            "keys 1: poses 1: pose: .*'elbow'",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{"at": 0, "pose": {"right_elbow": -2.0}}]}]},
+            "keys 1: poses 1: pose.right_elbow is -2; it must be within the joint's limits, 0 to",
+        ),
+    ],
+)
+def test_what_a_character_cannot_do_is_refused_in_a_line(
+    tmp_path: Path, name: str, tracks: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(MotionError, match=sentence) as caught:
+        made(tmp_path, name, **tracks)
+
+    assert "\n" not in str(caught.value)
