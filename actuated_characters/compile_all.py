@@ -1,7 +1,8 @@
 """`python -m actuated_characters.compile_all`: what is computed often is compiled, and kept.
 
-Else that which the planner, the renderer and batches compute is compiled at the first plan, picture
-and step. `--runs` leaves out batches, which training alone needs, and which take nearly half of it.
+Else that which the planner, the renderer, inverse kinematics and batches compute is compiled at the
+first plan, picture, pose and step. `--runs` leaves out batches, which training alone needs, and
+which take nearly half of it.
 """
 
 import sys
@@ -10,6 +11,7 @@ from actuated_characters.batch.worlds import Batch
 from actuated_characters.render.engine.renderer import FrameSpec, Renderer
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
+from controller_node.references.posing import Posing
 from sim_node.physics.engine import INSTALLED_ENGINES
 
 _SIZE = (64, 48)  # pixels
@@ -25,6 +27,8 @@ def main() -> None:
             plan = make_plan("humanoid", 0.05, clip, simulator, planner)
             *_, last = ticks_in_process(plan)
     Renderer(plan.character, skinned=True).picture(FrameSpec(last.following.position), _SIZE)
+    rest = plan.character.layout.configuration(last.following.position)
+    Posing(plan.character).fit(rest, [])
     if sys.argv[1:] == ["--runs"]:
         return
     with Batch(plan.character, 1, threads=1, clip="walk") as batch:
