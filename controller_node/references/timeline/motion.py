@@ -6,6 +6,7 @@ from controller_node.references.timeline.description import Timeline
 from controller_node.references.timeline.file import read_timeline
 from controller_node.references.timeline.ground import GroundMaker
 from controller_node.references.timeline.layers import layer_of_poses
+from controller_node.references.timeline.targets import TargetLayers
 from msgs_config.character.model import Character
 from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
@@ -52,9 +53,15 @@ def timeline_motion(character: Character, values: Values, timeline: Timeline) ->
     for layer in timeline.layers:
         motion = layer_of_poses(character, motion, layer)
         end = max(end, layer.poses[-1].at + (layer.go or 0.0))
+    targets = TargetLayers(character)
+    for entry in timeline.reaches:
+        motion = targets.reach(motion, entry)
+    for entry in timeline.looks:
+        motion = targets.look(motion, entry)
+    end = max([end, *(each.until + each.go for each in (*timeline.reaches, *timeline.looks))])
     clamped = ", ".join(dict.fromkeys(maker.clamped))
     warnings = (f"kept within joint limits: {clamped}",) if clamped else ()
-    return Motion(TimelineReference(timeline, motion, end), warnings)
+    return Motion(TimelineReference(timeline, motion, end), (*warnings, *targets.warnings))
 
 
 @REFERENCES.register("timeline", TimelineSettings)

@@ -1,5 +1,6 @@
 """The motion of timelines: layers of poses over clips and steering, without a jump."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,13 @@ import yaml
 from controller_node import parameters as for_controller
 from controller_node.references.base import REFERENCES, ReferenceState
 from controller_node.references.clip import ClipReference
-from controller_node.references.timeline.motion import TimelineReference
+from controller_node.references.timeline.file import read_timeline
+from controller_node.references.timeline.motion import TimelineReference, timeline_motion
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import MotionError
+from msgs_config.parameters import Values
 from tests.support.motion import (
     assert_consistent,
     assert_moves_as_it_says,
@@ -35,6 +40,7 @@ WAVE = {
 WAVE["poses"][0]["pose"]["neck_z"] = 0.2  # type: ignore[index]
 ELBOW = LAYOUT.dof_names.index("right_elbow")
 NECK = [LAYOUT.dof_names.index(f"neck_{axis}") for axis in "xyz"]
+SLOW = {"at": 0.5, "until": 3.0, "velocity": [0.1, 0.0, 0.0]}
 WALK = {"at": 0.5, "clip": "walk", "from": 0.2}
 
 
@@ -42,11 +48,14 @@ def made(directory: Path, name: str = "humanoid", **tracks: Any) -> TimelineRefe
     whole, _ = loaded(name)
     file = directory / "moves.yaml"
     file.write_text(yaml.safe_dump(tracks), encoding="utf-8")
-    given = {"character": name, "reference": "timeline", "timeline": str(file), "rate": RATE}
-    values = for_controller.resolve_for(whole, given)
-    reference = REFERENCES["timeline"](whole, values).reference
+    reference = REFERENCES["timeline"](whole, values_of(name, str(file))).reference
     assert isinstance(reference, TimelineReference)
     return reference
+
+
+def values_of(name: str, file: str) -> Values:
+    given = {"character": name, "reference": "timeline", "timeline": file, "rate": RATE}
+    return for_controller.resolve_for(loaded(name)[0], given)
 
 
 def heading(state: ReferenceState) -> float:
@@ -133,6 +142,63 @@ def test_an_arm_on_a_table_has_poses_too(tmp_path: Path) -> None:
 
     assert reference.sample(1.0).configuration.position[0] == pytest.approx(0.5)
     assert reference.end == pytest.approx(1.3)
+
+
+# Targets
+
+
+def link_frame(name: str, state: ReferenceState, link: str) -> tuple[FloatArray, FloatArray]:
+    """A link's place (3,) in m and axes (3, 3) in the world, by MuJoCo's kinematics."""
+    whole, layout = loaded(name)
+    model = DynamicsModel(whole)
+    model.update(state.configuration.position, np.zeros(layout.size))
+    number = [each.name for each in whole.links].index(link)
+    places, axes = model.link_frames(np.array([number]))
+    return places[0].copy(), axes[0].copy()
+
+
+REACH = {"at": 1.0, "until": 2.0, "link": "right_wrist", "point": [0.35, -0.25, 1.1], "out": 0.5}
+
+
+def test_a_hand_is_at_its_point_from_when_to_when_it_is_said(tmp_path: Path) -> None:
+    reference = made(tmp_path, steering=[SLOW], reach=[REACH])
+    alone = made(tmp_path, steering=[SLOW])
+
+    for time in np.linspace(1.0, 2.0, 50).tolist():
+        place, _ = link_frame("humanoid", reference.sample(time), "right_wrist")
+        np.testing.assert_allclose(place, REACH["point"], atol=0.005)
+    for time in (0.69, 2.51):
+        assert_same_motion(LAYOUT, reference.sample(time), alone.sample(time), atol=1e-9)
+    moved = LAYOUT.difference(alone.sample(1.5).configuration, reference.sample(1.5).configuration)
+    assert {LAYOUT.dof_names[row][:10] for row in np.flatnonzero(np.abs(moved) > 1e-9)} == {
+        "right_shou",
+        "right_elbo",
+    }
+    assert made(tmp_path, reach=[REACH]).end == 2.5
+
+
+def test_a_head_faces_its_point(tmp_path: Path) -> None:
+    point = np.array((1.0, 0.8, 1.2))
+    reference = made(tmp_path, look=[{"at": 1.0, "until": 2.0, "point": point.tolist()}])
+    (place, axes), (_, before) = (
+        link_frame("humanoid", reference.sample(time), "neck") for time in (1.5, 0.0)
+    )
+
+    way = point - place
+    ahead = axes @ (before.T @ (1.0, 0.0, 0.0))  # what was ahead at rest
+    np.testing.assert_allclose(ahead, way / np.linalg.norm(way), atol=1e-3)
+
+
+def test_what_is_out_of_reach_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "moves.yaml"
+    file.write_text(yaml.safe_dump({"reach": [{**REACH, "point": [2.0, 0.0, 1.0]}]}))
+
+    motion = timeline_motion(HUMANOID, values_of("humanoid", str(file)), read_timeline(str(file)))
+
+    (warning,) = motion.warnings
+    assert re.search(r"reach 1: 'right_wrist' stays up to 1\.\d\d m short of its point$", warning)
+    place, _ = link_frame("humanoid", motion.reference.sample(1.5), "right_wrist")
+    assert place[0] > 0.4  # stretched towards it
 
 
 # Clips and steering
@@ -245,6 +311,14 @@ def test_states_are_the_same_however_often_and_in_which_order_they_are_asked_for
             "humanoid",
             {"steering": [{"at": 0, "until": 1, "velocity": [9, 0, 0]}]},
             r"steering 1: velocity is more than it can, which is at most \[",
+        ),
+        ("humanoid", {"reach": [{**REACH, "link": "ear"}]}, "reach 1: .*'ear'"),
+        ("humanoid", {"reach": [{**REACH, "link": "root"}]}, "reach 1: no joint moves 'root'"),
+        ("humanoid", {"look": [{**REACH, "link": "root"}]}, "look 1: no joint turns 'root'"),
+        (
+            "franka_panda",
+            {"look": [{"at": 0, "until": 1, "point": [0, 0, 1]}]},
+            "look 1: link is missing",
         ),
         (
             "humanoid",
