@@ -83,35 +83,24 @@ def _run_of_timeline(
     options: argparse.Namespace, simulator: dict[str, object], controller: dict[str, object]
 ) -> PlannedRun:
     """A run that does what a timeline says; pushes and throws of the options come besides."""
-    from actuated_characters.runs.plan import count_ticks, make_plan
     from actuated_characters.runs.planned.inputs import PlannedInputs
     from actuated_characters.runs.planned.throws import plan_throws
-    from actuated_characters.runs.planned.timeline import (
-        default_duration,
-        plan_events,
-        set_parameters,
-    )
-    from controller_node.references.timeline.file import read_timeline
-    from msgs_config.character.loading import load_character
-    from msgs_config.shared_parameters import collides
+    from actuated_characters.runs.planned.timeline import plan_timeline
 
-    timeline = read_timeline(options.timeline)
-    name = options.character or timeline.character
-    character = load_character(name, collides(simulator | controller))
-    set_parameters(timeline, character, simulator, controller)
-    duration = timeline.duration if options.duration is None else options.duration
-    reference = {"reference": "timeline", "timeline": options.timeline}
-    plan = make_plan(name, duration or DURATION, reference, simulator, controller, loaded=character)
-    if duration is None:
-        plan = plan.lasting(count_ticks(default_duration(plan), plan.simulation.rate_hz))
-    events = plan_events(plan)
-    throws, in_the_way = plan_throws(plan, options.throw)
-    inputs = PlannedInputs(
-        [*events.pushes, *_pushes(options.push, plan, None)],
-        [*events.throws, *throws],
-        strengths=events.strengths,
+    run = plan_timeline(
+        options.timeline,
+        simulator,
+        controller,
+        character=options.character,
+        duration=options.duration,
     )
-    return PlannedRun(plan, inputs, [*plan.warnings, *events.warnings, *in_the_way])
+    throws, in_the_way = plan_throws(run.plan, options.throw)
+    inputs = PlannedInputs(
+        [*run.inputs.pushes, *_pushes(options.push, run.plan, None)],
+        [*run.inputs.throws, *throws],
+        strengths=run.inputs.strengths,
+    )
+    return PlannedRun(run.plan, inputs, [*run.warnings, *in_the_way])
 
 
 def _set_options(options: argparse.Namespace, controller: dict[str, object]) -> None:

@@ -1,9 +1,10 @@
 """What a timeline's file says beside the motion: how it is run, and what is sent, and when."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from actuated_characters.runs.plan import SHARED, RunPlan
+from actuated_characters.runs.plan import SHARED, RunPlan, count_ticks, make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow, parse_throw, plan_throw
 from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push
@@ -14,26 +15,66 @@ from controller_node.references.timeline.description import (
     StrengthEntry,
     Timeline,
 )
+from controller_node.references.timeline.file import read_timeline
 from controller_node.references.timeline.motion import TimelineReference
+from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, MotionError, one_of
 from msgs_config.messages.clock import TickClock
+from msgs_config.shared_parameters import collides
 from sim_node.node_settings import NodeSettings
 
 _AFTERWARDS = 1.0  # s that a run goes on when all of a timeline is over
 
 
 @dataclass(frozen=True)
-class Events:
-    """What is sent to the nodes, each with the stamp from which on it counts."""
+class TimelineRun:
+    """A run that does what a timeline says."""
 
-    pushes: Sequence[PlannedPush]
-    throws: Sequence[PlannedThrow]
-    strengths: Sequence[PlannedStrengths]
+    plan: RunPlan
+    inputs: PlannedInputs
     warnings: Sequence[str]
 
+    @property
+    def reference(self) -> TimelineReference:
+        """What is tracked."""
+        assert isinstance(self.plan.reference, TimelineReference)
+        return self.plan.reference
 
-def set_parameters(
+
+def plan_timeline(
+    name: str,
+    simulator: Mapping[str, object],
+    controller: Mapping[str, object],
+    *,
+    character: str | None = None,
+    duration: float | None = None,
+) -> TimelineRun:
+    """Plan the run of a timeline; what is given takes precedence over what the file says.
+
+    Args:
+        name: A shipped timeline, or the path of a file.
+        simulator: Parameters of `sim_node`, by name.
+        controller: Parameters of `controller_node`, by name.
+        character: A name or path.
+        duration: s; without any, the run lasts until all of the timeline is over, and a bit.
+
+    Raises:
+        ActuatedCharactersError: names the entry that cannot be, and why.
+    """
+    timeline, own, other = read_timeline(name), dict(simulator), dict(controller)
+    whose = character or timeline.character
+    loaded = load_character(whose, collides(own | other))
+    _set_parameters(timeline, loaded, own, other)
+    duration = timeline.duration if duration is None else duration
+    reference = {"reference": "timeline", "timeline": name}
+    plan = make_plan(whose, duration or _AFTERWARDS, reference, own, other, loaded=loaded)
+    if duration is None:
+        plan = plan.lasting(count_ticks(_default_duration(plan), plan.simulation.rate_hz))
+    return _with_events(plan, timeline)
+
+
+def _set_parameters(
     timeline: Timeline,
     character: Character,
     simulator: dict[str, object],
@@ -56,7 +97,7 @@ def set_parameters(
         given.update({name: brought[name] for name in brought if name not in (*given, *taken)})
 
 
-def default_duration(plan: RunPlan) -> float:
+def _default_duration(plan: RunPlan) -> float:
     """The length in s of a run of a timeline that says none: until all of it is over, and a bit."""
     assert isinstance(plan.reference, TimelineReference)
     timeline = plan.reference.timeline
@@ -67,14 +108,9 @@ def default_duration(plan: RunPlan) -> float:
     return max(over) + _AFTERWARDS
 
 
-def plan_events(plan: RunPlan) -> Events:
-    """The events of the timeline that a plan tracks.
-
-    Raises:
-        MotionError: names the entry that the character cannot be sent, and why.
-    """
-    assert isinstance(plan.reference, TimelineReference)
-    timeline, warnings = plan.reference.timeline, list[str]()
+def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
+    """The run of a plan, with the events of its timeline."""
+    warnings = list(plan.warnings)
     pushes = [push for entry in timeline.pushes for push in _pushes(plan, entry)]
     throws: list[PlannedThrow] = []
     for entry in timeline.throws:
@@ -85,7 +121,8 @@ def plan_events(plan: RunPlan) -> Events:
             raise MotionError(f"{entry.place}: {error}") from error
         throws.append(throw)
         warnings += [f"{entry.place}: {line}" for line in in_the_way]
-    return Events(pushes, throws, _strengths(plan, timeline.strengths), warnings)
+    strengths = _strengths(plan, timeline.strengths)
+    return TimelineRun(plan, PlannedInputs(pushes, throws, strengths=strengths), warnings)
 
 
 def _pushes(plan: RunPlan, entry: PushEntry) -> list[PlannedPush]:
