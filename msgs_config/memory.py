@@ -28,6 +28,13 @@ _PLAIN_MODULES = ("builtins", "collections", "functools", "pathlib")
 _SEAL_BYTES = 32
 
 
+class OnePart:
+    """A part in whose place an object goes on with another one, whatever that is made of.
+
+    No memory refers to what is in it.
+    """
+
+
 class MemoryFormat:
     """Writes and reads the memory of an object, or of another that was made in the same way."""
 
@@ -111,14 +118,18 @@ class _Counter(pickle.Pickler):
         self.found: list[object] = []
         self._known: set[int] = set()
 
-    def persistent_id(self, each: object) -> None:
-        """Note an object; it stays in the pickle, so that what is in it is found as well."""
+    def persistent_id(self, each: object) -> bool | None:
+        """Note an object; it stays in the pickle, so that what is in it is found as well.
+
+        What is in a `OnePart` is not: another one may take its place.
+        """
         is_plain = type(each).__module__ in _PLAIN_MODULES or isinstance(
             each, np.generic | np.dtype
         )
         if not is_plain and id(each) not in self._known:
             self._known.add(id(each))
             self.found.append(each)
+        return True if isinstance(each, OnePart) else None
 
     def reducer_override(self, each: object) -> Any:
         """Leave out what was computed once it was asked for: it is not there from the start."""

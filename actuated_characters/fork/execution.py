@@ -18,7 +18,6 @@ from actuated_characters.replay.players.character_files import (
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import Progress, run_in_process
 from actuated_characters.runs.plan import RunPlan
-from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throw_hits import describe_hits, read_states
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
@@ -47,7 +46,7 @@ def run_fork(
         write_bag=True,
         progress=lambda ticks: progress(max(ticks - fork.skipped, 0)),
         recording={KEY: fork.origin.to_json(), "sensors": list(fork.sensors)},
-        inputs=PlannedInputs(fork.pushes, fork.throws),
+        inputs=fork.inputs,
         fork=fork.node,
         resets=fork.resets,
     )
@@ -87,9 +86,9 @@ def _is_unchanged(recording: Recording) -> bool:
 def describe_new_hits(fork: ForkPlan, directory: Path) -> Sequence[str]:
     """Of each new throw a few words on whether it hit; none where other balls may be there."""
     balls = fork.recording.balls[0] if fork.recording.balls else None
-    if not fork.throws or fork.resets or (balls is not None and balls.names):
+    if not fork.inputs.throws or fork.resets or (balls is not None and balls.names):
         return ()
-    throws = [*fork.repeated_throws, *fork.throws]
+    throws = [*fork.repeated_throws, *fork.inputs.throws]
     since = fork.skipped / fork.plan.simulation.rate_hz
     words = describe_hits(fork.plan, throws, read_states(directory), since)
     return words[len(fork.repeated_throws) :]

@@ -19,6 +19,7 @@ from actuated_characters.replay.world import (
     make_pushes,
     simulator_values,
 )
+from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush
 from msgs_config.errors import RecordingError
@@ -36,6 +37,7 @@ class Stop:
     settings: list[tuple[str, dict[str, Any]]] = field(default_factory=list)  # by node, in order
     pushes: list[PlannedPush] = field(default_factory=list)
     throws: list[PlannedThrow] = field(default_factory=list)
+    strengths: list[PlannedStrengths] = field(default_factory=list)
     resets: bool = False  # the state of the row begins an episode
 
 

@@ -27,6 +27,7 @@ from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import Turns, ros_node
@@ -42,6 +43,7 @@ from msgs_config.settings import Settings, parameter
 from msgs_config.versions import describe_changes, installed_versions
 
 _LATEST = 2**62  # ns
+_STRENGTH = topics.STRENGTH.of(topics.CONTROLLER_NODE)
 
 
 class ForkSettings(Settings):
@@ -58,8 +60,10 @@ class ForkSettings(Settings):
     settings: str = parameter("{}", "new parameters of nodes from that state on, JSON by node")
     file: str = parameter("pushes.json", "new pushes, as a run writes them")
     throws: str = parameter("throws.json", "new throws, as a run writes them")
+    strengths: str = parameter("", "new strengths, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
     throw_subscribers: int = parameter(1, "likewise to throw")
+    strength_subscribers: int = parameter(1, "likewise to controller_node/strength")
     session: GivenSession = GivenSession()
 
 
@@ -105,6 +109,8 @@ class ForkNode(Player):
         requested = {name for each in self._requests.values() for name, _ in each}
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
+        if settings.strengths:
+            sent.append((_STRENGTH, settings.strength_subscribers))
         self._outgoing: dict[str, tuple[Publisher, int]] = {
             topic.name: (self.node.publisher(topic), count) for topic, count in sent
         }
@@ -175,11 +181,12 @@ class ForkNode(Player):
     def _send(self, row: int) -> Turns:
         """Send the inputs of a stop."""
         stop = self._stops.get(row, Stop())
-        if row and (stop.settings or self._requests.get(row)):
+        if row and (stop.settings or stop.strengths or self._requests.get(row)):
             yield from self._wait_for_answer(row - 1)
         for node, settings in stop.settings:
             yield from self._set(node, settings)
         messages: list[tuple[str, bytes]] = [*self._requests.get(row, ())]
+        messages += [(_STRENGTH.name, each.encode()) for each in stop.strengths]
         for push in stop.pushes:
             content = replace(push.arrays(), frame_id=self._session)
             messages.append((topics.EXTERNAL_WRENCH.name, encode_wrenches(content)))
@@ -259,6 +266,8 @@ class ForkNode(Player):
             at = self._tick_clock.tick(planned.stamp_ns) - self._first_tick
             return stops[max(begin for begin in begins if begin <= at) + 1]
 
+        if settings.strengths:
+            stops[row].strengths += read_strengths(Path(settings.strengths))
         for push in read_pushes(Path(settings.file)):
             stop_of(push).pushes.append(push)
         for throw in read_throws(Path(settings.throws)):

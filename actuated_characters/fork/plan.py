@@ -22,6 +22,7 @@ from actuated_characters.replay.players.controller_parameters import changed_fil
 from actuated_characters.replay.world import check_keyframe, simulator_values
 from actuated_characters.runs.plan import RunPlan, count_ticks
 from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node import parameters as controller_parameters
@@ -60,8 +61,7 @@ class ForkPlan:
     recording: Recording
     plan: RunPlan
     origin: ForkedFrom
-    pushes: Sequence[PlannedPush]  # the new ones
-    throws: Sequence[PlannedThrow]
+    inputs: PlannedInputs  # the new ones
     repeated_throws: Sequence[PlannedThrow]
     resets: int  # that are repeated
     node: Mapping[str, object]  # parameters of the node `fork`
@@ -110,8 +110,7 @@ def plan_fork(
         recording=recording,
         plan=plan,
         origin=_origin(path, past, point.row),
-        pushes=pushes,
-        throws=throws,
+        inputs=PlannedInputs(pushes, throws),
         repeated_throws=[throw for stop in stops for throw in stop.throws],
         resets=sum(stop.resets for stop in stops),
         node={

@@ -119,6 +119,10 @@ class JointLayout:
         if len(self._index) < start or len(self._joint) < len(placed):
             raise LayoutError("two joints or degrees of freedom have the same name")
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but the indices that were asked for, which say who has asked."""
+        return vars(self) | {"_found": {}}
+
     @property
     def joint_names(self) -> list[str]:
         """Names of the joints that move, in order."""

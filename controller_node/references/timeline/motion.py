@@ -8,6 +8,7 @@ from controller_node.references.timeline.ground import GroundMaker
 from controller_node.references.timeline.layers import layer_of_poses
 from controller_node.references.timeline.targets import TargetLayers
 from msgs_config.character.model import Character
+from msgs_config.memory import OnePart
 from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
 
@@ -22,8 +23,11 @@ class TimelineSettings(Settings):
     )
 
 
-class TimelineReference:
-    """A timeline's motion. It remembers states, which a planner asks for again and again."""
+class TimelineReference(OnePart):
+    """A timeline's motion. It remembers states, which a planner asks for again and again.
+
+    A controller goes on from a keyframe with an edited timeline in its place.
+    """
 
     def __init__(self, timeline: Timeline, motion: Reference, end: float) -> None:
         """`end` is when all of the motion is over, s."""

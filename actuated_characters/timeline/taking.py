@@ -1,0 +1,216 @@
+"""Makes takes: of a timeline that was edited, only what follows the edit is simulated."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from actuated_characters.fork.execution import run_fork
+from actuated_characters.fork.plan import ForkInputs, ForkPlan, plan_fork
+from actuated_characters.recorder.run_directory import PARAMETERS, prepare_directory
+from actuated_characters.runs.in_process import run_in_process
+from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.inputs import PlannedInputs
+from actuated_characters.runs.planned.strengths import PlannedStrengths, read_strengths
+from actuated_characters.runs.planned.timeline import TimelineRun, plan_timeline
+from actuated_characters.timeline.takes import Take, Takes, write_copy
+from controller_node.planner.settings import (
+    NO_PLANNER,
+    PlannerParameters,
+    make_planner_settings,
+)
+from controller_node.references.base import Reference
+from msgs_config.messages.clock import FIRST_TICK, TickClock
+from msgs_config.parameters import Values
+from msgs_config.shared_parameters import KEYFRAME_PERIOD
+
+Progress = Callable[[float], None]
+"""Is called with the time in s that is simulated so far, since the first state."""
+
+_KEYFRAME_PERIOD = 0.25  # s: how far before an edit a take may have to begin
+_Planned = TypeVar("_Planned", bound=Planned)
+
+
+@dataclass(frozen=True)
+class PlannedTake:
+    """A take that was checked."""
+
+    run: TimelineRun
+    takes: Takes
+    parent: Take | None  # None: it is simulated from the beginning
+    fork: ForkPlan | None  # of a take of the line that the parent ends
+    begin: float  # s, where its recording begins
+    since: float  # s, from which on it may differ from its parent
+    is_as_before: bool  # nothing has changed: the parent is the take of this file
+
+    @property
+    def until(self) -> float:
+        """The end of it, s."""
+        return self.run.plan.ticks / self.run.plan.simulation.rate_hz
+
+
+def plan_take(file: Path, parent: Take | None) -> PlannedTake:
+    """Plan the take of a timeline as its file is now; without a parent, from the beginning.
+
+    Raises:
+        ActuatedCharactersError: names the entry that cannot be simulated, or what is wrong with
+            the parent.
+    """
+    keyframes = {KEYFRAME_PERIOD.name: _KEYFRAME_PERIOD}
+    run, takes = plan_timeline(str(file), keyframes, {}), Takes(file)
+    fresh = PlannedTake(run, takes, None, None, 0.0, 0.0, is_as_before=False)
+    if parent is None:
+        return fresh
+    before = plan_timeline(str(parent.timeline), keyframes, {})
+    if not _same_settings(run.plan, before.plan):
+        return fresh
+    rate = run.plan.simulation.rate_hz
+    first = first_difference(before, run)
+    if first is None:
+        return replace(fresh, parent=parent, since=parent.until, is_as_before=True)
+    line = [take for take in takes.line(parent) if round(take.begin * rate) < first]
+    if not line:
+        return replace(fresh, parent=parent, since=first / rate)
+    fork = _fork(line, first, run)
+    begin = line[-1].begin + fork.skipped / rate
+    return PlannedTake(run, takes, parent, fork, begin, first / rate, is_as_before=False)
+
+
+def make_take(
+    planned: PlannedTake, title: str = "", progress: Progress = lambda time: None
+) -> Take:
+    """Simulate a planned take into a folder of its own.
+
+    Raises:
+        ActuatedCharactersError: one of the nodes failed.
+    """
+    directory = planned.takes.free_directory()
+    prepare_directory(directory, overwrite=False)
+    run, rate = planned.run, planned.run.plan.simulation.rate_hz
+    copy = {"timeline": str(write_copy(run.reference.timeline.file, directory))}
+    if planned.fork is None:
+        plan = replace(run.plan, controller=Values({**run.plan.controller, **copy}))
+        run_in_process(
+            plan, directory, inputs=run.inputs, progress=lambda ticks: progress(ticks / rate)
+        )
+    else:
+        fork, begin = planned.fork, planned.begin
+        plan = replace(fork.plan, controller=Values({**fork.plan.controller, **copy}))
+        run_fork(
+            replace(fork, plan=plan),
+            directory,
+            progress=lambda ticks: progress(begin + ticks / rate),
+        )
+    parent = "" if planned.parent is None else planned.parent.name
+    take = Take(directory, parent, planned.begin, planned.since, planned.until, title)
+    take.write()
+    return take
+
+
+def first_difference(before: TimelineRun, run: TimelineRun) -> int | None:
+    """The first tick, counted from 0, in whose state two runs may answer otherwise.
+
+    They have the same parameters. None: one is what the other is, and as long.
+    """
+    ahead, ticks = _ticks_ahead(run.plan), min(before.plan.ticks, run.plan.ticks)
+    changes = _changed_inputs(before, run)
+    if before.plan.ticks != run.plan.ticks:
+        changes.append(ticks - 1)
+    clock = TickClock(run.plan.simulation.rate_hz)
+    motions = before.plan.reference, run.plan.reference
+    for tick in range(min([ticks, *changes]) + ahead):
+        if not _is_same(*motions, clock.time_after(tick)):
+            changes.append(max(tick - ahead, 0))
+            break
+    return min(changes, default=None)
+
+
+def _is_same(one: Reference, other: Reference, time: float) -> bool:
+    """Whether two motions have the same bits at a time in s."""
+    first, second = one.sample(time), other.sample(time)
+    return all(
+        mine.tobytes() == its.tobytes()
+        for mine, its in (
+            (first.configuration.position, second.configuration.position),
+            (first.configuration.orientations_xyzw, second.configuration.orientations_xyzw),
+            (first.velocity, second.velocity),
+            (first.acceleration, second.acceleration),
+        )
+    )
+
+
+def _ticks_ahead(plan: RunPlan) -> int:
+    """How many ticks ahead of a state the answer to it may look at the reference."""
+    given = PlannerParameters.of(plan.controller)
+    if given.planner == NO_PLANNER:
+        return 2 + given.delay
+    settings = make_planner_settings(plan.character, plan.controller)
+    return settings.horizon + 2 * settings.period + given.delay + 2
+
+
+def _changed_inputs(before: TimelineRun, run: TimelineRun) -> list[int]:
+    """The ticks of inputs that only one of two runs has."""
+    clock = TickClock(run.plan.simulation.rate_hz)
+    pairs = zip(before.inputs.by_name().values(), run.inputs.by_name().values(), strict=True)
+    return [
+        clock.tick(each.stamp_ns) - FIRST_TICK
+        for old, new in pairs
+        for some, others in ((old, new), (new, old))
+        for each in some
+        if each not in others
+    ]
+
+
+def _same_settings(one: RunPlan, other: RunPlan) -> bool:
+    """Whether two runs have the same character and parameters, but for the timeline itself."""
+
+    def settings(plan: RunPlan) -> tuple[object, ...]:
+        simulator, controller = dict(plan.simulator), dict(plan.controller)
+        del simulator["max_ticks"], controller["timeline"]
+        return simulator, controller, plan.character.file_text, plan.character.loading.urdf_text
+
+    return settings(one) == settings(other)
+
+
+def _fork(line: Sequence[Take], first: int, run: TimelineRun) -> ForkPlan:
+    """The fork of the last of a line of takes, from a tick on that it has."""
+    origin, clock = line[-1], TickClock(run.plan.simulation.rate_hz)
+    begin = round(origin.begin * clock.rate_hz)
+    fork = plan_fork(
+        origin.directory,
+        (first - begin) / clock.rate_hz,
+        ForkInputs({}, with_later=False),
+        (run.plan.ticks - begin) / clock.rate_hz,
+    )
+    from_stamp = clock.stamp_ns(FIRST_TICK + first)
+
+    def later(planned: Sequence[_Planned]) -> list[_Planned]:
+        return [each for each in planned if each.stamp_ns >= from_stamp]
+
+    inputs = PlannedInputs(
+        later(run.inputs.pushes),
+        later(run.inputs.throws),
+        strengths=later(_overriding(line, run.inputs.strengths)),
+    )
+    return replace(fork, inputs=inputs)
+
+
+def _overriding(line: Sequence[Take], wanted: Sequence[PlannedStrengths]) -> list[PlannedStrengths]:
+    """Strengths that count in place of all that a line of takes was sent.
+
+    A controller has those that wait for their stamps in its keyframes. Of two of one stamp the
+    later ones count; so each of those stamps gets what is wanted then.
+    """
+    sent = [
+        each.stamp_ns
+        for take in line
+        for file in [take.directory / PARAMETERS / "strengths.json"]
+        if file.is_file()
+        for each in read_strengths(file)
+    ]
+    overriding = []
+    for stamp_ns in sorted({*sent, *(each.stamp_ns for each in wanted)}):
+        in_force = [each.strengths for each in wanted if each.stamp_ns <= stamp_ns]
+        overriding.append(PlannedStrengths(stamp_ns, in_force[-1] if in_force else {}))
+    return overriding
