@@ -10,12 +10,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from actuated_characters.bags.forked_from import ForkedFrom
 from actuated_characters.bags.format.metadata import read_metadata
 from actuated_characters.bags.keyframes import KeyframePlace, find_keyframes
 from actuated_characters.bags.recording import Recording, find_bag, read_recordings
 from actuated_characters.fork.inputs import ForkPoint, recorded_stops
 from actuated_characters.metrics.state_hash import hash_of_states
-from actuated_characters.recorder.forked_from import ForkedFrom
 from actuated_characters.recorder.run_directory import read_metrics
 from actuated_characters.replay.comparison import clock_of, first_tick_of
 from actuated_characters.replay.players.controller_parameters import changed_files, first_parameters

@@ -5,12 +5,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuated_characters.bags.forked_from import given_origin
 from actuated_characters.bags.format.metadata import BAG
 from actuated_characters.bags.format.storage import SIMULATED
 from actuated_characters.bags.last_parts import LastPartsWriter
 from actuated_characters.bags.writer import BagWriter
 from actuated_characters.metrics.collector import HEARD, MetricsCollector
-from actuated_characters.recorder.forked_from import given_origin
 from actuated_characters.recorder.log_time import SimulatedLogTime
 from actuated_characters.recorder.parameters import RecorderSettings
 from actuated_characters.recorder.run_directory import metrics_directory, write_metrics

@@ -14,12 +14,12 @@ from typing import Any
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
+from actuated_characters.bags.forked_from import KEY, ForkedFrom, read_forked_from
 from actuated_characters.bags.format.metadata import storage_of
 from actuated_characters.bags.format.storage import MCAP, SUFFIXES
 from actuated_characters.bags.reader import OpenBag, open_bag
 from actuated_characters.bags.recording import describe_foreign, find_bag
 from actuated_characters.bags.robots.reading import is_own
-from actuated_characters.recorder.forked_from import KEY, ForkedFrom, read_forked_from
 from actuated_characters.report.verdict import describe_law
 from msgs_config.character.layout import ROOT, JointLayout, JointType
 from msgs_config.character.model import ROOT_TORQUE

@@ -14,11 +14,11 @@ from actuated_characters.bags.recording import (
     Recording,
     find_bag,
     read_recording,
-    read_recordings,
 )
 from actuated_characters.bags.robots.base_poses import BaseMotion, base_frames, find_base
 from actuated_characters.bags.robots.decoding import read_timed
 from actuated_characters.bags.robots.joint_series import JointSeries, collect_joints
+from actuated_characters.bags.whole import read_whole
 from msgs_config import files
 from msgs_config.arrays import IntArray
 from msgs_config.character.file import CharacterFile, read_character_file, read_character_texts
@@ -62,7 +62,7 @@ class RobotRecording(Recording):
 
 
 def read_any(path: Path, source: RobotSource) -> tuple[Recording, ...]:
-    """Read the characters of a run, or the robot of any other bag with joint states.
+    """Read the characters of a run, a fork's with its past, or the robot of any other bag.
 
     Raises:
         RecordingError: there is no complete bag, or it has no joint states that can be used; says
@@ -73,7 +73,7 @@ def read_any(path: Path, source: RobotSource) -> tuple[Recording, ...]:
     types = read_topics(bag)
     if is_own(types) and source.topic is None and source.base is None:
         if source.character is None:
-            return read_recordings(path)
+            return read_whole(path)
         return (read_recording(path, source.character),)
     return (read_robot(bag, types, source),)
 

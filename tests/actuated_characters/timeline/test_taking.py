@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.bags.whole import read_whole
 from actuated_characters.runs.planned.timeline import plan_timeline
 from actuated_characters.timeline.takes import Take, Takes
 from actuated_characters.timeline.taking import make_take, plan_take
@@ -111,6 +112,12 @@ def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> No
     fourth = make_take(plan_take(early, third))
     assert_same_end(fourth, whole_run(early, tmp_path / "early"))
 
+    # with its past, each is the whole run
+    for take, name in ((third, "late"), (fourth, "early")):
+        (own,), whole = read_whole(take.directory), read_recording(tmp_path / name)
+        for field in ("stamps_ns", "position", "velocity", "effort"):
+            np.testing.assert_array_equal(getattr(own, field), getattr(whole, field))
+        assert len(own.applied_wrench) == len(own.effort) == len(whole.effort)
     takes = Takes(early)
     assert [each.name for each in takes.line(fourth)][-3:] == [
         second.name,
