@@ -12,11 +12,13 @@ from typing import Any
 
 import yaml
 
+from controller_node.references.timeline.file import timeline_path
 from msgs_config import files
 from msgs_config.errors import MotionError, RecordingError, one_of
 from msgs_config.whole_files import write_whole
 
 TIMELINE, ABOUT = "timeline.yaml", "take.json"
+_SUFFIX = ".takes"
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,10 @@ class Take:
 
 
 class Takes:
-    """The takes of a timeline's file."""
+    """The takes of a timeline, in a folder."""
 
-    def __init__(self, file: Path) -> None:
-        self.directory = file.with_suffix(".takes")
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
 
     def all(self) -> list[Take]:
         """Those that are complete, the oldest first."""
@@ -87,6 +89,16 @@ class Takes:
                 raise RecordingError(f"{folder}: {error.strerror}") from error
             else:
                 return folder
+
+
+def takes_of(name: str) -> Takes:
+    """The takes beside a timeline's file; those of a shipped one are in the working directory.
+
+    Raises:
+        MotionError: there is no shipped timeline of that name, or the file is of another kind.
+    """
+    file = timeline_path(name)
+    return Takes((file if str(file) == name else Path(name)).with_suffix(_SUFFIX))
 
 
 def _read(folder: Path) -> Take | None:

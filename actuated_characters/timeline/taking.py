@@ -1,5 +1,6 @@
 """Makes takes: of a timeline that was edited, only what follows the edit is simulated."""
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -50,15 +51,17 @@ class PlannedTake:
         return self.run.plan.ticks / self.run.plan.simulation.rate_hz
 
 
-def plan_take(file: Path, parent: Take | None) -> PlannedTake:
+def plan_take(name: str, takes: Takes, parent: Take | None) -> PlannedTake:
     """Plan the take of a timeline as its file is now; without a parent, from the beginning.
+
+    `name` is a shipped timeline, or the path of a file.
 
     Raises:
         ActuatedCharactersError: names the entry that cannot be simulated, or what is wrong with
             the parent.
     """
     keyframes = {KEYFRAME_PERIOD.name: _KEYFRAME_PERIOD}
-    run, takes = plan_timeline(str(file), keyframes, {}), Takes(file)
+    run = plan_timeline(name, keyframes, {})
     fresh = PlannedTake(run, takes, None, None, 0.0, 0.0, is_as_before=False)
     if parent is None:
         return fresh
@@ -80,12 +83,24 @@ def plan_take(file: Path, parent: Take | None) -> PlannedTake:
 def make_take(
     planned: PlannedTake, title: str = "", progress: Progress = lambda time: None
 ) -> Take:
-    """Simulate a planned take into a folder of its own.
+    """Simulate a planned take into a folder of its own, which is removed if that fails.
 
     Raises:
         ActuatedCharactersError: one of the nodes failed.
     """
     directory = planned.takes.free_directory()
+    try:
+        _simulate(planned, directory, progress)
+    except BaseException:
+        shutil.rmtree(directory, ignore_errors=True)
+        raise
+    parent = "" if planned.parent is None else planned.parent.name
+    take = Take(directory, parent, planned.begin, planned.since, planned.until, title)
+    take.write()
+    return take
+
+
+def _simulate(planned: PlannedTake, directory: Path, progress: Progress) -> None:
     prepare_directory(directory, overwrite=False)
     run, rate = planned.run, planned.run.plan.simulation.rate_hz
     copy = {"timeline": str(write_copy(run.reference.timeline.file, directory))}
@@ -102,10 +117,6 @@ def make_take(
             directory,
             progress=lambda ticks: progress(begin + ticks / rate),
         )
-    parent = "" if planned.parent is None else planned.parent.name
-    take = Take(directory, parent, planned.begin, planned.since, planned.until, title)
-    take.write()
-    return take
 
 
 def first_difference(before: TimelineRun, run: TimelineRun) -> int | None:

@@ -54,6 +54,12 @@ def _cycles(path: Path) -> None:
     _call(path, "motion", "loop", clip, "--output", path / "cycle.json")
 
 
+def _timeline(path: Path) -> None:
+    """Two seconds with an arm that is raised."""
+    poses = "[{at: 1.0, pose: {right_elbow: 1.0}}]"
+    path.write_text(f"duration: 2\nkeys: [{{poses: {poses}}}]\n", encoding="utf-8")
+
+
 def _robot(path: Path) -> None:
     write_robot(path)
 
@@ -109,6 +115,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robot.urdf": _robot,
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
+    "dance.yaml": _timeline,
     "body.glb": _body,
     "joints.yaml": _joints,
     "swing.py": _code("README.md", "class Swing"),

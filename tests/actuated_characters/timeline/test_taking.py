@@ -10,8 +10,8 @@ import yaml
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.bags.whole import read_whole
 from actuated_characters.runs.planned.timeline import plan_timeline
-from actuated_characters.timeline.takes import Take, Takes
-from actuated_characters.timeline.taking import make_take, plan_take
+from actuated_characters.timeline.takes import Take, takes_of
+from actuated_characters.timeline.taking import PlannedTake, make_take, plan_take
 from msgs_config.errors import ActuatedCharactersError
 from tests.support.runs import run_plan_here
 
@@ -31,6 +31,10 @@ def written(directory: Path, **changes: Any) -> Path:
     file = directory / "moves.yaml"
     file.write_text(yaml.safe_dump({**CONTENT, **changes}), encoding="utf-8")
     return file
+
+
+def planned_take(file: Path, parent: Take | None) -> PlannedTake:
+    return plan_take(str(file), takes_of(str(file)), parent)
 
 
 def whole_run(file: Path, directory: Path) -> Recording:
@@ -55,7 +59,7 @@ def assert_same_end(take: Take, whole: Recording) -> None:
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Take:
     directory = tmp_path_factory.mktemp("takes")
-    return make_take(plan_take(written(directory), None))
+    return make_take(planned_take(written(directory), None))
 
 
 def edited(first: Take, **changes: Any) -> Path:
@@ -87,7 +91,7 @@ def test_a_take_is_the_end_of_a_whole_run_of_the_edited_file(
     first: Take, tmp_path: Path, changes: dict[str, Any], since: float | tuple[float, float]
 ) -> None:
     file = edited(first, **changes)
-    planned = plan_take(file, first)
+    planned = planned_take(file, first)
 
     take = make_take(planned)
 
@@ -103,13 +107,13 @@ def test_a_take_is_the_end_of_a_whole_run_of_the_edited_file(
 @pytest.mark.slow
 def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> None:
     strengths = [{"at": 1.7, "until": 1.95, "joints": ["neck"], "strength": 0.2}]
-    second = make_take(plan_take(edited(first, strengths=strengths), first))
+    second = make_take(planned_take(edited(first, strengths=strengths), first))
 
     late = edited(first, strengths=[{**strengths[0], "joints": ["neck", "right_elbow"]}])
-    third = make_take(plan_take(late, second))
+    third = make_take(planned_take(late, second))
     assert_same_end(third, whole_run(late, tmp_path / "late"))
     early = edited(first, pushes=[])
-    fourth = make_take(plan_take(early, third))
+    fourth = make_take(planned_take(early, third))
     assert_same_end(fourth, whole_run(early, tmp_path / "early"))
 
     # with its past, each is the whole run
@@ -118,7 +122,7 @@ def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> No
         for field in ("stamps_ns", "position", "velocity", "effort"):
             np.testing.assert_array_equal(getattr(own, field), getattr(whole, field))
         assert len(own.applied_wrench) == len(own.effort) == len(whole.effort)
-    takes = Takes(early)
+    takes = takes_of(str(early))
     assert [each.name for each in takes.line(fourth)][-3:] == [
         second.name,
         third.name,
@@ -128,7 +132,7 @@ def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> No
 
 
 def test_nothing_is_simulated_where_nothing_has_changed(first: Take) -> None:
-    planned = plan_take(edited(first), first)
+    planned = planned_take(edited(first), first)
 
     assert planned.is_as_before and planned.fork is None
     assert planned.since == first.until
@@ -141,7 +145,7 @@ def test_nothing_is_simulated_where_nothing_has_changed(first: Take) -> None:
 def test_other_parameters_are_simulated_from_the_beginning(
     first: Take, changes: dict[str, Any]
 ) -> None:
-    planned = plan_take(edited(first, **changes), first)
+    planned = planned_take(edited(first, **changes), first)
 
     assert (planned.parent, planned.fork, planned.begin) == (None, None, 0.0)
 
@@ -149,11 +153,11 @@ def test_other_parameters_are_simulated_from_the_beginning(
 @pytest.mark.nightly
 def test_a_planned_take_is_the_end_of_a_planned_run(tmp_path: Path) -> None:
     planner = {"run": {"planner": "predictive"}, "clips": [], "duration": 2.5}
-    first = make_take(plan_take(written(tmp_path, **planner), None))
+    first = make_take(planned_take(written(tmp_path, **planner), None))
     poses = [{"at": 2.2, "pose": {"left_elbow": 0.7}}]
     file = written(tmp_path, **planner, keys=[ELBOW, {"poses": poses}])
 
-    take = make_take(plan_take(file, first))
+    take = make_take(planned_take(file, first))
 
     # its change is foreseen by 0.8 s, and 2 plans
     assert take.since == pytest.approx(1.9 - 0.8 - 0.1, abs=0.05)
@@ -171,14 +175,14 @@ def test_a_clip_beside_the_file_is_found_by_the_take(tmp_path: Path, first: Take
         tmp_path, clips=[{"at": 0.0, "clip": "own.txt"}], duration=0.2, strengths=[], pushes=[]
     )
 
-    take = make_take(plan_take(file, None))
+    take = make_take(planned_take(file, None))
 
-    again = plan_take(file, take)
+    again = planned_take(file, take)
     assert again.is_as_before
 
 
 def test_incomplete_takes_are_none_and_numbers_are_free(tmp_path: Path) -> None:
-    takes = Takes(tmp_path / "moves.yaml")
+    takes = takes_of(str(tmp_path / "moves.yaml"))
     assert takes.all() == []
     folders = [takes.free_directory() for _ in range(3)]
     assert [folder.name for folder in folders] == ["1", "2", "3"]
