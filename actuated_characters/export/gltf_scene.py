@@ -73,7 +73,6 @@ class _SceneBuilder:
         self.document = GltfDocument(_GENERATOR)
         self._skins = SkinnedMeshes(self.document) if skinned else None
         self._given = skin
-        self._count = 0  # of characters so far
         self._seconds = times - times[0]
         self._times = self.document.add_times(self._seconds)
         self._world = self.document.add_node("world", rotation_xyzw=UPRIGHT_XYZW)
@@ -106,9 +105,8 @@ class _SceneBuilder:
             if link.joint.type in _ROTATING_JOINTS:
                 self.document.animate(node, "rotation", self._times, turns)
         if self._skins and skin is not None:
-            colors = colors_of(skin, character, self._count)
+            colors = colors_of(skin, character, trajectory.color_number)
             self._skins.add(f"{prefix}skin", character, skin, colors, nodes[1:])
-        self._count += 1
 
     def add_ball(self, ball: BallTrajectory) -> None:
         """Add a ball, of no size while it is not there, which is how glTF hides a node."""

@@ -103,8 +103,9 @@ def of_recordings(recordings: Sequence[Recording]) -> Trajectories:
             recording.name or recording.character.name,
             recording.character,
             recording.layout.configuration(recording.position),
+            color_number,
         )
-        for recording in scene.recordings
+        for recording, color_number in zip(scene.recordings, scene.color_numbers, strict=True)
     )
     return Trajectories(
         times=scene.times,

@@ -27,6 +27,7 @@ class SceneSettings:
     write: Callable[[Picture, str], Picture]  # adds a caption
     skinned: bool = True  # draw skins in place of the shapes that they are made from
     skin: GivenSkin | None = None  # from a file, in place of those
+    color_numbers: tuple[int, ...] | None = None  # of the characters (`Renderer`)
 
     def renderer(self) -> Renderer:
         """Make what draws it."""
@@ -36,6 +37,7 @@ class SceneSettings:
             terrain=self.terrain,
             skinned=self.skinned,
             skin=self.skin,
+            color_numbers=self.color_numbers,
         )
 
 

@@ -124,6 +124,7 @@ class Movie:
             write_on,
             self._settings.skinned,
             self._settings.skin,
+            scene.color_numbers,
         )
         return draw(stays, self._frames, most)
 

@@ -12,6 +12,7 @@ from actuated_characters.bags.thrown_balls import ThrownBall, thrown_balls
 from actuated_characters.render.engine.posed_characters import LinkForce
 from actuated_characters.render.engine.renderer import FrameSpec
 from actuated_characters.render.pushed_stills import Ticks
+from actuated_characters.render.skin.palette import color_number
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -41,6 +42,11 @@ class RecordedScene:
     def characters(self) -> tuple[Character, ...]:
         """As they stood there."""
         return tuple(recording.character for recording in self.recordings)
+
+    @property
+    def color_numbers(self) -> tuple[int, ...]:
+        """Which colours each of them has, as in the viewer."""
+        return tuple(color_number(each.world, k) for k, each in enumerate(self.recordings))
 
     @property
     def times(self) -> FloatArray:

@@ -44,10 +44,11 @@ _WHITE = 255
 
 
 class _Look(NamedTuple):
-    """How characters are drawn: `skinned` and `skin` of `strip`."""
+    """How characters are drawn, as `Renderer` is told."""
 
     skinned: bool = True
     skin: GivenSkin | None = None
+    color_numbers: tuple[int, ...] | None = None
 
 
 _SKINNED = _Look()
@@ -102,7 +103,7 @@ def strip(
     captions = _captions(scene.times, stills) if labels else [""] * len(rows)
     frames = scene.frames(stills.rows, captions, ghosts=ghost, pushes=stills.ticks())
     world = WorldSettings(ground=scene.ground, terrain=scene.terrain)
-    look = _Look(skinned, skin)
+    look = _Look(skinned, skin, scene.color_numbers)
     return _draw_strip(scene.characters, world, frames, columns, size, look, progress)
 
 

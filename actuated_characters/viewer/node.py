@@ -10,7 +10,7 @@ from rclpy.node import Node
 from actuated_characters.render.drawn_shapes import drawn_shapes
 from actuated_characters.render.skin.choosing import skin_of
 from actuated_characters.render.skin.given import GivenSkin
-from actuated_characters.render.skin.palette import team_numbers
+from actuated_characters.render.skin.palette import color_number
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.hands import Hands
 from actuated_characters.viewer.controls.panel import ControlPanel, Subject
@@ -80,7 +80,7 @@ class ViewerNode(Node):
         )
         self._simulators = WatchedSimulators(self, self.get_namespace().rstrip("/"), self._log)
         self._drawn: dict[str, LiveCharacter] = {}
-        self._numbers: dict[str, int] = {}  # of characters that are alone, by their namespaces
+        self._numbers: dict[str, int] = {}  # of characters in their order, by their namespaces
         self._parameters: dict[str, Mapping[str, tuple[ShownParameter, ...]]] = {}
         self._balls: dict[str, DrawnBalls] = {}
         # by names in the scene: texts of URDFs, and the corners (k, 3), m
@@ -221,10 +221,8 @@ class ViewerNode(Node):
     def _number_of(self, watched: WatchedNamespace) -> int:
         """Which colours a character has: its team's in its world, or the next ones if alone."""
         assert watched.rebuilt is not None
-        world = watched.rebuilt.world
-        if world.name in world.characters:
-            return team_numbers(world.characters)[world.characters.index(world.name)]
-        return self._numbers.setdefault(watched.below, len(self._numbers))
+        alone = self._numbers.setdefault(watched.below, len(self._numbers))
+        return color_number(watched.rebuilt.world, alone)
 
     def _draw_terrain(self, watched: WatchedNamespace) -> None:
         """Draw the ground of a character's world as it is described now."""

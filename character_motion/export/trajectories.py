@@ -28,6 +28,7 @@ class CharacterTrajectory:
     name: str  # name in its world, or the character's own
     character: Character
     configurations: GeneralizedPosition  # (t, n) message form, (t, k, 4)
+    color_number: int = 0  # which colours it has among those of its world
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,7 @@ class Renderer:
         samples: int = 2,
         skinned: bool = False,
         skin: GivenSkin | None = None,
+        color_numbers: Sequence[int] | None = None,
     ) -> None:
         """Make the surfaces of all that may be seen.
 
@@ -78,6 +79,8 @@ class Renderer:
                 character has a floating base and none of its shapes is a mesh; and ghosts that
                 are where they really are as outlines, not transparent.
             skin: With `skinned`, a mesh from a file as the skin of every character.
+            color_numbers: Which colours the skin of each character has (`skin_colors`); by default
+                each has others.
 
         Raises:
             CharacterError: a file of a character or of the terrain cannot be used.
@@ -89,23 +92,27 @@ class Renderer:
         self._has_ground = ground and self.posed.stand_on_ground()
         self._has_terrain = terrain is not None
         self._skinned = skinned
-        self._skins = self._make_skins(characters, skin) if skinned else []
+        self._skins = self._make_skins(characters, skin, color_numbers) if skinned else []
         shapes = list(self.posed.shapes)
         for made in self._skins:
             shapes[made.links] = [() for _ in shapes[made.links]]
         self._scene = RenderScene(shapes, terrain, self._skins)
 
     def _make_skins(
-        self, characters: Sequence[Character], given: GivenSkin | None
+        self,
+        characters: Sequence[Character],
+        given: GivenSkin | None,
+        color_numbers: Sequence[int] | None,
     ) -> list[SkinSurfaces]:
         """The skins of those characters that have one."""
         skins, first = [], 0
-        for number, character in enumerate(characters):
+        colored = range(len(characters)) if color_numbers is None else color_numbers
+        for number, (character, color) in enumerate(zip(characters, colored, strict=True)):
             links = slice(first, first + len(character.links))
             first = links.stop
             skin = skin_of(character, self.posed.shapes_of_characters[number], given)
             if skin is not None:
-                skins.append(SkinSurfaces(skin, colors_of(skin, character, number), links))
+                skins.append(SkinSurfaces(skin, colors_of(skin, character, color), links))
         return skins
 
     def picture(self, frame: FrameSpec, size: Size) -> Picture:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from actuated_characters.bags.rebuilding import RecordedWorld
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character, Quadruple
 from msgs_config.geometry import elementary
@@ -28,6 +29,17 @@ def team_numbers(names: Sequence[str]) -> list[int]:
     teams = [_NUMBERED.sub("", name) for name in names]
     found = list(dict.fromkeys(teams))
     return [found.index(team) for team in teams]
+
+
+def color_number(world: RecordedWorld, alone: int) -> int:
+    """The number, for `skin_colors`, that a character has wherever it is seen.
+
+    It is its team's in its world, whichever characters of it are shown; or `alone`, if it has its
+    world for itself.
+    """
+    if world.name not in world.characters:
+        return alone
+    return team_numbers(world.characters)[world.characters.index(world.name)]
 
 
 def skin_colors(character: Character, number: int = 0) -> list[Quadruple]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import viser
 
 from actuated_characters.render.skin.given import GivenSkin
-from actuated_characters.render.skin.palette import team_numbers
+from actuated_characters.render.skin.palette import color_number
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter, bind_nothing
 from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
@@ -79,7 +79,6 @@ class RecordedPlayer:
 
     def _add_characters(self, skin: GivenSkin | None) -> list[DrawnCharacter]:
         """Add all characters, with an arrow on the first one if the run can be forked."""
-        colors = team_numbers([each.name for each in self._run.recordings])
         drawn = [
             DrawnCharacter(
                 self._scene.api,
@@ -87,7 +86,7 @@ class RecordedPlayer:
                 each.character,
                 each.character.effort_limits(),
                 self._arrow.bind if self._run.can_be_forked else bind_nothing,
-                colors[number],
+                color_number(each.world, number),
                 skin,
             )
             for number, each in enumerate(self._run.recordings)

@@ -139,7 +139,8 @@ def test_trimesh_sees_the_skin_closed_and_on_the_ground() -> None:
 def test_characters_of_one_model_share_the_vertices_of_their_skins() -> None:
     motion, _ = random_motion(character("humanoid"))
     each = motion.characters[0]
-    two = replace(motion, characters=(replace(each, name="left"), replace(each, name="right")))
+    other_team = replace(each, name="right", color_number=1)
+    two = replace(motion, characters=(replace(each, name="left"), other_team))
 
     gltf = written(two)
 
