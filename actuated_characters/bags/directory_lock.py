@@ -34,6 +34,17 @@ class DirectoryLock:
                 os.close(descriptor)
 
 
+def is_locked(directory: Path) -> bool:
+    """Whether another lock holds a directory; none can hold one that is not there."""
+    try:
+        DirectoryLock(directory).release()
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def find_writer(files: Collection[Path]) -> int | None:
     """Return the number of a process that has one of some files open to write, None if none has.
 

@@ -110,7 +110,10 @@ def _print_lecture() -> None:
 
 
 def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
-    from actuated_characters.recorder.run_directory import prepare_directory
+    from actuated_characters.recorder.run_directory import (
+        prepare_directory,
+        prepare_free_directory,
+    )
     from actuated_characters.runs.plan import count_ticks
     from actuated_characters.scenes.execution import play_scene
     from actuated_characters.viewer.controls.shown_parameters import check_settings
@@ -122,8 +125,10 @@ def _run_scene(options: argparse.Namespace, scene: "Scene") -> None:
     ticks = count_ticks(options.duration, rate)
     check_settings(ViewerSettings.given(scene.viewer))
     directory = (options.output or Path("runs") / f"play-{scene.name}").absolute()
-    overwrite = options.overwrite or options.output is None
-    prepare_directory(directory, overwrite=overwrite, characters=scene.characters)
+    if options.output is None:
+        directory = prepare_free_directory(directory, replace=True)
+    else:
+        prepare_directory(directory, overwrite=options.overwrite)
     viewer = None if options.no_view else {**scene.viewer, **server_parameters(options)}
     check_interruption()  # all modules are imported by now
     last_megabytes = 0.0 if options.output else _LAST_MEGABYTES

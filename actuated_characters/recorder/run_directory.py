@@ -2,13 +2,14 @@
 
 import json
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from actuated_characters.bags.directory_lock import is_locked
 from actuated_characters.bags.format.metadata import BAG, EARLIER_BAG
 from actuated_characters.metrics.run_metrics import Series
 from msgs_config.errors import RecordingError, RunError
@@ -19,35 +20,28 @@ DAMAGED = BAG + ".damaged"  # what a recovery leaves beside the bag that it make
 SUMMARY, SERIES, PLOT = "summary.json", "measurements.csv", "plot.png"
 STRIP, VIDEO = "strip.png", "video.mp4"  # what `render` makes of the bag
 REPORT = "report"  # what `report` makes of the bag
+_FIGURES = (SUMMARY, SERIES, PLOT)
+_RESULTS = (BAG, EARLIER_BAG, DAMAGED, PARAMETERS, LOGS, *_FIGURES, STRIP, VIDEO, REPORT)
 _MOST_NUMBERED = 10_000  # directories whose names differ by a number alone
 
 
-def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[str] = ()) -> None:
-    """Make a directory ready for a run's results; remove those of an earlier run, nothing else.
+def _with_parts(names: Iterable[str]) -> set[str]:
+    """The names, and those of what a run leaves that is killed while it writes them."""
+    return {name for each in names for name in (each, part_of(Path(each)).name)}
 
-    `characters` are the names of several, each of which has figures of its own.
+
+_PARTS, _PARTS_OF_FIGURES = _with_parts(_RESULTS), _with_parts(_FIGURES)
+
+
+def prepare_directory(directory: Path, *, overwrite: bool) -> None:
+    """Make a directory ready for a run's results; remove those of an earlier run, nothing else.
 
     Raises:
         RunError: there are results and `overwrite` is not set, or files that no run has made.
     """
-    names = (
-        BAG,
-        EARLIER_BAG,
-        DAMAGED,
-        PARAMETERS,
-        LOGS,
-        SUMMARY,
-        SERIES,
-        PLOT,
-        STRIP,
-        VIDEO,
-        REPORT,
-    )
-    results = [directory / name for name in (*names, *characters)]
-    results += [part_of(path) for path in results]  # left by a run that was killed
     try:
-        present = set(directory.iterdir()) if directory.exists() else set()
-        if present - set(results):
+        present = list(directory.iterdir()) if directory.exists() else []
+        if not all(map(_is_result, present)):
             raise RunError(f"{directory} holds other files than a run's results; choose another")
         if present and not overwrite:
             raise RunError(f"{directory} holds results already; --overwrite replaces them")
@@ -59,18 +53,48 @@ def prepare_directory(directory: Path, *, overwrite: bool, characters: Sequence[
         raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
 
 
-def prepare_free_directory(directory: Path) -> Path:
-    """Make a directory ready whose name nobody gave: with a number, where it has results already.
+def prepare_free_directory(directory: Path, *, replace: bool = False) -> Path:
+    """Make a directory ready whose name nobody gave; returns it.
+
+    It has a number where there are results already, unless these are to be replaced: then where
+    there is anything else, or a run that is still recorded.
 
     Raises:
         RunError: it cannot be written to.
     """
-    for number in range(1, _MOST_NUMBERED):
-        free = directory if number == 1 else directory.with_name(f"{directory.name}-{number}")
-        if not free.exists() or not any(free.iterdir()):
-            break
-    prepare_directory(free, overwrite=False)
+    numbers = range(2, _MOST_NUMBERED)
+    numbered = (directory.with_name(f"{directory.name}-{number}") for number in numbers)
+    is_free = _is_replaceable if replace else _is_empty
+    try:
+        free = next((each for each in (directory, *numbered) if is_free(each)), directory)
+    except OSError as error:
+        raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
+    prepare_directory(free, overwrite=replace)
     return free
+
+
+def _is_empty(directory: Path) -> bool:
+    return not directory.exists() or (directory.is_dir() and not any(directory.iterdir()))
+
+
+def _is_replaceable(directory: Path) -> bool:
+    if not directory.is_dir():
+        return not directory.exists()
+    return all(map(_is_result, directory.iterdir())) and not is_locked(directory / BAG)
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a run has made it; what a killed one left counts, too.
+
+    A folder of any other name is a character's, if it has figures, or nothing yet.
+    """
+    if path.name in _PARTS:
+        return True
+    if path.is_symlink() or not path.is_dir():
+        return False
+    inside = {each.name for each in path.iterdir()}
+    begins_with = {SERIES, part_of(Path(SERIES)).name}
+    return not inside or (inside <= _PARTS_OF_FIGURES and not inside.isdisjoint(begins_with))
 
 
 def metrics_directory(run: Path, namespace: str, *, is_alone: bool) -> Path:
