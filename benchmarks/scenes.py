@@ -43,9 +43,6 @@ def reset(browser: Browser) -> None:
 def pour(browser: Browser) -> None:
     """Begin again, and pour balls until a part of them lies."""
     browser.click("Reset")
-    browser.evaluate(
-        "[...document.querySelectorAll('*')].find(each => each.innerText === 'Touch').click()"
-    )
     for _ in range(3):
         time.sleep(1.0)
         browser.click("Pour balls")

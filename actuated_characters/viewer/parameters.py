@@ -13,6 +13,10 @@ SHOWN = {
 """What is drawn beside the character itself, and what the panel calls it."""
 
 
+TOUCH = "touch"
+"""The folder for drags and balls."""
+
+
 class ViewerSettings(Settings):
     """Where the page is, and how often it is drawn."""
 
@@ -26,6 +30,7 @@ class ViewerSettings(Settings):
     )
     curves: tuple[str, ...] = parameter((), "degrees of freedom that are drawn over time")
     hidden: tuple[str, ...] = parameter((), f"what is not shown at first, of: {', '.join(SHOWN)}")
+    opened: tuple[str, ...] = parameter((), f"folders that are open at first, of: {TOUCH}")
     skin: str = parameter("", "file of a skinned mesh (.glb) as the body of every character")
     skin_map: str = parameter("", "YAML file of that mesh's joints by links")
     fps: float = parameter(30.0, "most pictures a second", unit="Hz", minimum=1.0, maximum=120.0)

@@ -13,6 +13,7 @@ from actuated_characters.viewer.controls.expected_motion import ExpectedMotion
 from actuated_characters.viewer.controls.requests import Requests
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 
 _WINDOW = 8.0  # s that a curve shows
@@ -21,12 +22,14 @@ _PERIOD = 0.2  # s of wall time between two pictures of a curve: the page draws 
 _ASKING_PERIOD = 2.0  # s of wall time between two looks at parameters that others may set
 _SERIES = (
     uplot.Series(label="s before now"),
+    uplot.Series(label="it should be", stroke="#8fdbaa", width=5),  # below what it is
     uplot.Series(label="it is", stroke="#2a6fbb", width=2),
-    uplot.Series(label="it should be", stroke="#40be6e", width=2),
     uplot.Series(label="theory", stroke="#d9480f", width=2, dash=(7.0, 5.0)),
 )
 _TIME = uplot.Scale(time=False, auto=False, range=(-_WINDOW, 0.0))
-_ASPECT = 1.6
+_ASPECT = 1.9
+_ROOM_ABOVE = (14, 8, 0, 0)  # pixels, for half of a number at the upper edge, and to the right
+_UNITS = {JointType.PRISMATIC: "m", JointType.REVOLUTE: "rad"}
 _MARGIN, _LEAST_MARGIN = 0.08, 0.01  # share of the height; m or rad
 _LEAST_SHARE = 0.3  # of a plot's height that curves have, or it fits anew
 _MOST_POINTS = round(_WINDOW / _STEP)
@@ -43,7 +46,7 @@ class ShownCurves:
         self._expected: ExpectedMotion | None = None
         self._points: dict[str, deque[tuple[float, ...]]] = {}
         self._ranges: dict[str, tuple[float, float]] = {}
-        self._columns = 3  # of a point: time, place, and where it should be; with theory one more
+        self._columns = 3  # of a point: time, target, place; with theory one more
         self._plots: dict[str, Any] = {}
         self._next_picture = self._next_look = 0.0  # s, wall time
         self._waits = False  # for the controller to tell its parameters
@@ -97,7 +100,7 @@ class ShownCurves:
             at = names.index(name)
             wanted = np.nan if sample.reference is None else float(sample.reference[at])
             points = self._points.setdefault(name, deque(maxlen=_MOST_POINTS))
-            point = (time, float(sample.state.position[at]), wanted, theory)
+            point = (time, wanted, float(sample.state.position[at]), theory)
             points.append(point[: self._columns])
 
     def _choose(self, character: Character) -> None:
@@ -137,7 +140,11 @@ class ShownCurves:
         y = uplot.Scale(auto=False, range=around)
         self._plots[name].scales = {"x": _TIME, "y": y}
 
-    def _add_plot(self, title: str, data: tuple[FloatArray, ...]) -> Any:
+    def _add_plot(self, name: str, data: tuple[FloatArray, ...]) -> Any:
+        assert self._character is not None
+        joints = self._character.layout.joints
+        kind = next(each.type for each in joints if name in each.dof_names)
+        title = f"{name} ({_UNITS[kind]}) in the last {_WINDOW:g} s" if kind in _UNITS else name
         with self._folder:
             return self._gui.add_uplot(
                 data,
@@ -146,4 +153,5 @@ class ShownCurves:
                 scales={"x": _TIME, "y": uplot.Scale(auto=True)},
                 legend=uplot.Legend(show=True, live=False),
                 aspect=_ASPECT,
+                padding=_ROOM_ABOVE,
             )

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -13,8 +14,10 @@ from std_srvs.srv import SetBool, Trigger
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.drive import DrivingControls
 from actuated_characters.viewer.controls.hands import Hands
+from actuated_characters.viewer.controls.legend import legend
 from actuated_characters.viewer.controls.live_curves import ShownCurves
 from actuated_characters.viewer.controls.markup import as_text
+from actuated_characters.viewer.controls.pace import Pace
 from actuated_characters.viewer.controls.parameter_controls import ParameterControls
 from actuated_characters.viewer.controls.requests import Requests
 from actuated_characters.viewer.controls.shown_parameters import (
@@ -25,7 +28,7 @@ from actuated_characters.viewer.controls.shown_parameters import (
 from actuated_characters.viewer.drawing.live_character import LiveCharacter
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene import BrowserScene
-from actuated_characters.viewer.parameters import SHOWN, ViewerSettings
+from actuated_characters.viewer.parameters import SHOWN, TOUCH, ViewerSettings
 from msgs_config.messages import topics
 
 _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 1.0, "2": 2.0}
@@ -33,11 +36,6 @@ _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = (
     "Drag a body to pull it. Shift and click throws a ball at it. Drag the background to look "
     "around."
-)
-_LEGEND = (
-    "Green: where it should be. Redder: the torque is nearer its limit. Darker: the right side. "
-    "Grey arrows: forces of contacts; half a metre is its weight. Orange: pushes. Yellow: the "
-    "centre of mass; blue: what it stands on."
 )
 _TEXT_PERIOD = 0.2  # s between texts: the page lays each out
 _NAME_OF_ONLY_CHARACTER = "alone"  # the character of a simulator that has one, without a name
@@ -76,21 +74,28 @@ class ControlPanel:
         self._characters: Mapping[str, LiveCharacter] = {}
         self._next_text = 0.0
         self._names: tuple[str, ...] = ()
+        self._is_chosen = False  # whether a page has chosen the character
+        self._pace = Pace()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         if settings.about:
             gui.add_markdown(settings.about)
         self._state = gui.add_markdown("no simulator")
         self._which: Any = gui.add_dropdown("Character", (_NAME_OF_ONLY_CHARACTER,), visible=False)
+        self._which.on_update(self._later(self._choose, lambda: True))
         self._add_run()
         gui.add_markdown(_HELP)
+        self._legend = gui.add_html("")
         self._told = gui.add_markdown("", visible=False)
         self._curves = ShownCurves(gui, self.requests, settings.curves)
         order = self._told.order + 0.5  # of the controls that a scene has first
         self._drive = DrivingControls(node, gui, actions)
-        self._add_touch()
-        self._add_shown()
-        self._controls = ParameterControls(gui, self.requests, self._later, self.tell, order)
+        self._add_touch(opened=TOUCH in settings.opened)
+        # what a page is for comes first, if it says so
+        rest = gui.add_folder("More", expand_by_default=False) if settings.about else nullcontext()
+        with rest:
+            self._add_shown()
+        self._controls = ParameterControls(gui, self.requests, self._later, self.tell, order, rest)
 
     def _later(self, function: Callable[..., None], value: Callable[[], Any]) -> Callable[..., Any]:
         """A callback of viser that has the node's thread call a function with a value."""
@@ -101,6 +106,9 @@ class ControlPanel:
 
         return change
 
+    def _choose(self, is_chosen: bool) -> None:
+        self._is_chosen = is_chosen
+
     def _add_run(self) -> None:
         buttons = self._gui.add_button_group("Run", (_PAUSE, _RESUME, _STEP, _RESET))
         buttons.on_click(self._later(self._control, lambda: buttons.value))
@@ -109,9 +117,9 @@ class ControlPanel:
         )
         self._speed.on_update(self._later(self._set_speed, lambda: self._speed.value))
 
-    def _add_touch(self) -> None:
+    def _add_touch(self, *, opened: bool) -> None:
         gui, hands = self._gui, self._hands
-        with gui.add_folder("Touch", expand_by_default=False):
+        with gui.add_folder("Touch", expand_by_default=opened):
             for label, name, limits in (
                 ("Spring (N/m)", "stiffness", (50.0, 3000.0, 50.0)),
                 ("Ball (kg)", "ball_mass", (0.1, 20.0, 0.1)),
@@ -130,7 +138,6 @@ class ControlPanel:
     def _add_shown(self) -> None:
         gui = self._gui
         with gui.add_folder("Show", expand_by_default=False):
-            gui.add_markdown(_LEGEND)
             for name, label in SHOWN.items():
                 box = gui.add_checkbox(label, initial_value=self.shows[name])
                 box.on_update(self._later(partial(self._show, name), _value_of(box)))
@@ -152,6 +159,8 @@ class ControlPanel:
         if names and names != self._names:
             self._names = names
             self._which.options = names
+            if not self._is_chosen and self._which.value != names[0]:
+                self._which.value = names[0]
             self._which.visible = len(names) > 1
         chosen = dict(zip(names, known.values(), strict=True)).get(self._which.value)
         self._drive.update(None if chosen is None else chosen.below)
@@ -168,9 +177,21 @@ class ControlPanel:
         stamp_ns, now = stamps_ns.get(chosen.below), time.monotonic()
         if stamp_ns is not None and now >= self._next_text:
             self._next_text = now + _TEXT_PERIOD
-            text = f"**{as_text(chosen.character)}**, {1e-9 * stamp_ns:.2f} s"
+            pace = self._pace.measure(chosen.below, 1e-9 * stamp_ns, now)
+            text = f"**{as_text(chosen.character)}**, {pace}{1e-9 * stamp_ns:.2f} s"
             if self._state.content != text:
                 self._state.content = text
+            self._show_legend(chosen.below)
+
+    def _show_legend(self, below: str) -> None:
+        character = self._characters.get(below)
+        text = legend(
+            self.shows,
+            has_sides=character is not None and character.has_sides,
+            one_of_several=len(self._names) > 1,
+        )
+        if self._legend.content != text:
+            self._legend.content, self._legend.visible = text, bool(text)
 
     def show_curves(
         self, characters: Mapping[str, LiveCharacter], samples: Mapping[str, CharacterSample]

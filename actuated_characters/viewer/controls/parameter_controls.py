@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from typing import Any
 
@@ -9,7 +10,6 @@ import viser
 
 from actuated_characters.viewer.controls.requests import Requests
 from actuated_characters.viewer.controls.shown_parameters import (
-    AT_RESET,
     SIMULATOR,
     TO_TRY,
     ShownParameter,
@@ -28,9 +28,13 @@ class ParameterControls:
         later: Later,
         tell: Callable[[str], None],
         order: float | None = None,
+        rest: AbstractContextManager[object] | None = None,
     ) -> None:
-        """`order` is where a scene's own folder stands on the panel; others stand at its end."""
-        self._order = order
+        """`order` is where a scene's own folder stands on the panel; others stand at its end.
+
+        They stand in `rest`, closed, if that is a folder.
+        """
+        self._order, self._rest = order, rest or nullcontext()
         self._gui, self._requests, self._later, self._tell = gui, requests, later, tell
         self._nodes: dict[str, str] = {}  # whole names of nodes by those in the contract
         self._prefix = ""  # begins the names of the character's own parameters of its simulator
@@ -62,10 +66,7 @@ class ParameterControls:
             folder.remove()
         self._folders, self._controls, self._whole = {}, {}, set()
         for title, parameters in self._shown.items():
-            is_first, order = not self._folders, self._order if title == TO_TRY else None
-            folder = self._gui.add_folder(
-                title, visible=False, expand_by_default=is_first, order=order
-            )
+            folder = self._add_folder(title)
             self._folders[title] = folder
             with folder:
                 for shown in parameters:
@@ -74,6 +75,13 @@ class ParameterControls:
                         self._later(partial(self._set, shown), partial(getattr, handle, "value"))
                     )
                     self._controls[shown.key] = shown, handle
+
+    def _add_folder(self, title: str) -> Any:
+        if title == TO_TRY:
+            return self._gui.add_folder(title, visible=False, order=self._order)
+        is_open = not self._folders and isinstance(self._rest, nullcontext)
+        with self._rest:
+            return self._gui.add_folder(title, visible=False, expand_by_default=is_open)
 
     def _add(self, shown: ShownParameter) -> Any:
         if shown.options:
@@ -129,8 +137,9 @@ class ParameterControls:
     def _told(self, shown: ShownParameter, value: object, node: str, reason: str) -> None:
         """Say what a node has said; where it has rejected a value, show the one in force."""
         given = f"{value:g}" if isinstance(value, float) else str(value)
-        waits = shown in self._shown.get(AT_RESET, ())
-        self._tell(f"{shown.name} {given}: {reason or ('at the next reset' if waits else 'set')}")
+        self._tell(
+            f"{shown.name} {given}: {reason or ('at the next reset' if shown.at_reset else 'set')}"
+        )
         if reason:
             self._ask([shown.key])
             return

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from actuated_characters.viewer.parameters import SHOWN, ViewerSettings
+from actuated_characters.viewer.parameters import SHOWN, TOUCH, ViewerSettings
 from controller_node.behaviours.factory import BEHAVIOUR_PARAMETERS
 from controller_node.control_laws import LAWS
 from msgs_config.character.layout import ROOT
@@ -30,6 +30,7 @@ class ShownParameter:
     options: tuple[str, ...] = ()
     range: tuple[float, float, float] | None = None  # least, most, step
     has_no_limit: bool = False  # the slider's largest value stands for infinity
+    at_reset: bool = False  # counts from the next reset on
     nodes: tuple[str, ...] = (CONTROLLER,)  # nodes that have it; the first one's value is shown
     then: tuple[tuple[str, str, str], ...] = ()  # node, name, value: set when this one was taken
 
@@ -92,9 +93,13 @@ def parse_slider(text: str) -> ShownParameter:
 def check_settings(settings: ViewerSettings) -> None:
     """Raise ConfigurationError if the page cannot have what it is set to have."""
     check_controls(settings.controls)
-    for name in settings.hidden:
-        if name not in SHOWN:
-            raise ConfigurationError(one_of("'hidden'", name, list(SHOWN)))
+    for key, names, known in (
+        ("hidden", settings.hidden, list(SHOWN)),
+        ("opened", settings.opened, [TOUCH]),
+    ):
+        for name in names:
+            if name not in known:
+                raise ConfigurationError(one_of(f"'{key}'", name, known))
 
 
 def check_controls(texts: Sequence[str]) -> None:
@@ -131,7 +136,8 @@ def shown_parameters(
     )
     law = tuple(each for each in _LAW if drives_root or each.name not in (_FORCE, _TORQUE))
     law += _BALANCE if character.feet else ()
-    folders = {"Controller": law, "Strengths": strengths, AT_RESET: (*motion, *_WORLD)}
+    at_reset = tuple(replace(each, at_reset=True) for each in (*motion, *_WORLD))
+    folders = {"Controller": law, "Strengths": strengths, AT_RESET: at_reset}
     known = {".".join(each.key): each for own in folders.values() for each in own}
     own = [
         parse_slider(text) if len(text.split()) > 1 else known[text]

@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from actuated_characters.render.engine.camera_pose import Spheres
+from actuated_characters.viewer.drawing.colors import CENTRE, CONTACT, PUSH, SUPPORT
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.support import support_polygon
 from msgs_config.arrays import FloatArray
@@ -15,7 +16,6 @@ from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 
-_CONTACT, _PUSH, _CENTRE, _SUPPORT = (70, 72, 80), (230, 60, 20), (250, 200, 0), (40, 110, 200)
 _METRES_A_WEIGHT = 0.5  # m, length of an arrow that stands for the character's own weight
 _MAX_ARROW_LENGTH = 2.0  # m, of an arrow
 _MIN_ARROW_SHARE = 1e-3  # share of the weight that an arrow shows at least
@@ -51,19 +51,19 @@ class CharacterMarks:
         self._centres = np.array([link.inertial_pose.position for link in character.links])
         self._frame = scene.add_frame(name, show_axes=False)
         self._place: FloatArray = np.zeros(3)  # of that frame, m, world
-        self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=_CENTRE, visible=False)
-        self._below = scene.add_icosphere(f"{name}/below", 0.02, color=_CENTRE, visible=False)
+        self._centre = scene.add_icosphere(f"{name}/centre", 0.035, color=CENTRE, visible=False)
+        self._below = scene.add_icosphere(f"{name}/below", 0.02, color=CENTRE, visible=False)
         self._arrows = {
             what: scene.add_arrows(
                 f"{name}/{what}", np.zeros((1, 2, 3)), color, shaft_radius=0.012,
                 head_radius=0.03, head_length=0.06, visible=False,
             )
-            for what, color in (("contacts", _CONTACT), ("pushes", _PUSH))
+            for what, color in (("contacts", CONTACT), ("pushes", PUSH))
         }  # fmt: skip
         self._support = scene.add_line_segments(
             f"{name}/support",
             np.zeros((1, 2, 3)),
-            _SUPPORT,
+            SUPPORT,
             thickness=3.0,
             thickness_units="screen",
             visible=False,

@@ -15,6 +15,7 @@ from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.skin.palette import skin_colors
 from actuated_characters.render.skin.skin import Skin
 from actuated_characters.viewer.drawing.character_marks import CharacterMarks, LinkPoses
+from actuated_characters.viewer.drawing.colors import GHOST, STRAIN
 from actuated_characters.viewer.drawing.drawn_skin import DrawnSkin, GhostSkin
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.drawing.scene_poses import set_poses
@@ -25,12 +26,8 @@ from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character, Shape
 from msgs_config.geometry import rotations
 
-_STRAIN_COLOR = np.array((215.0, 25.0, 20.0))  # the colour of a link whose joint is at its limit
 _LEVELS = 12  # colours of a link, few so that they seldom change from frame to frame
 _GHOST_OPACITY = 0.3  # where it has no skin, which is seen as an outline
-GHOST = (64, 190, 110)
-"""Colour of the reference, or of another run beside it."""
-
 LinkMesh = viser.MeshHandle | viser.MeshSkinnedHandle
 
 Bind = Callable[[LinkMesh, int], None]
@@ -84,6 +81,8 @@ class DrawnCharacter:
         self._shape_counts = [len(own) for own in shapes]
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
         self._skin: DrawnSkin | None = None
+        self.has_sides = False
+        """Whether the right side of its skin has a colour of its own."""
         self._shows_skin = False
         self._ghost_skin: GhostSkin | None = None
         made = skin_of(character, shapes, skin)
@@ -109,6 +108,7 @@ class DrawnCharacter:
         colors = skin.link_colors()
         if colors is None:
             colors = np.array(skin_colors(self.character, number))[:, :3]
+            self.has_sides = len(np.unique(colors, axis=0)) > 1
         links = f"{self.name}/links"
         own = list(255.0 * colors)
         rgb = [_rgb(color) for color in own]
@@ -225,7 +225,7 @@ class DrawnCharacter:
                 continue
             self._levels[row] = level
             for mesh, color in zip(self._meshes[row], self._colors[row], strict=True):
-                mesh.color = _rgb(color + (_STRAIN_COLOR - color) * (level / _LEVELS))
+                mesh.color = _rgb(color + (np.array(STRAIN) - color) * (level / _LEVELS))
 
     def point(self, row: int, local: FloatArray) -> FloatArray:
         """A point (3,) of a link, m in its frame, in the world."""

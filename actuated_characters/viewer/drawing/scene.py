@@ -14,6 +14,12 @@ from numpy.typing import NDArray
 
 from actuated_characters.render.engine import ground
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter
+from actuated_characters.viewer.drawing.framing import (
+    EYE,
+    FIELD_OF_VIEW,
+    LOOK_AT,
+    frame_points,
+)
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
 from msgs_config.messages.projectiles import BallStates
@@ -27,13 +33,6 @@ _JUMP = 3.0  # m: a distance that is not caught up with but jumped
 BACKGROUND, LIGHT_TILE, DARK_TILE = (
     tuple(np.round(each).astype(int).tolist()) for each in (ground.BACKGROUND, *ground.COLORS)
 )
-EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
-"""Of the camera until a character is there, m, from the point on the ground below."""
-
-_RIGHT: FloatArray = np.array((0.5**0.5, 0.5**0.5, 0.0))  # of a view from there
-_FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
-_SHARE = 0.62  # of the view's height that characters take
-_WIDTH_OF_HEIGHT = 1.1  # of the view, beside the panel
 _ROOM = 5.0  # m around the characters, in which a terrain is seen at first
 _TILES = 56  # along an edge of the ground
 _PIXELS_A_TILE = 36
@@ -66,7 +65,7 @@ class BrowserScene:
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/sky", **_SKY_LIGHT)
         self._server = server
-        server.initial_camera.fov = _FIELD_OF_VIEW
+        server.initial_camera.fov = FIELD_OF_VIEW
         server.initial_camera.position = EYE
         server.initial_camera.look_at = LOOK_AT
         self._world = scene.add_frame(WORLD, show_axes=False)
@@ -103,19 +102,14 @@ class BrowserScene:
         boxes = np.concatenate([_corners(*each.bounds()) for each in characters])
         around = boxes.min(axis=0) - _ROOM, boxes.max(axis=0) + _ROOM
         corners = np.concatenate([boxes, *(np.clip(each, *around) for each in others)])
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        across = float(np.ptp(corners @ _RIGHT))
-        size = max(float(high[2] - low[2]), across / _WIDTH_OF_HEIGHT)
-        away = 0.5 * size / (_SHARE * np.tan(0.5 * _FIELD_OF_VIEW))
-        followed = self._followed(characters)
-        middle = 0.5 * (low + high) - (self.offset if followed is None else followed)
-        self._fit_ground(float(away))
-        back = np.subtract(EYE, LOOK_AT)
-        eye = middle + away / np.linalg.norm(back) * back
+        found, followed = frame_points(corners), self._followed(characters)
+        self._fit_ground(found.distance)
+        offset = self.offset if followed is None else followed
+        eye, look_at = found.eye - offset, found.look_at - offset
         initial = self._server.initial_camera
-        initial.position, initial.look_at = eye, middle
+        initial.position, initial.look_at = eye, look_at
         for client in self._server.get_clients().values():
-            client.camera.position, client.camera.look_at = eye, middle
+            client.camera.position, client.camera.look_at = eye, look_at
 
     def _followed(self, characters: Sequence[DrawnCharacter]) -> FloatArray | None:
         """The point (3,) of the ground that is followed, m, world; None if none is."""

@@ -13,7 +13,7 @@ from actuated_characters.bags.recording import Recording
 from actuated_characters.metrics.error_measures import limit_shares, vector_kinds
 from actuated_characters.metrics.recording_metrics import contact_series, tracking_errors
 from actuated_characters.report.decimation import span_maxima, span_starts
-from actuated_characters.viewer.drawing.drawn_character import GHOST
+from actuated_characters.viewer.drawing.colors import GHOST
 from actuated_characters.viewer.recorded.run import RecordedRun
 from msgs_config.arrays import FloatArray
 

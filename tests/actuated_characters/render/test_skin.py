@@ -227,7 +227,7 @@ def test_right_limbs_have_another_colour_wherever_the_character_stands() -> None
         colors = dict(zip((k.name for k in placed.links), skin_colors(placed), strict=True))
         for limb in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist"):
             assert colors[f"right_{limb}"] != colors[f"left_{limb}"] == colors["root"]
-    assert len({tuple(skin_colors(humanoid, number)) for number in range(4)}) == 4
+    assert len({tuple(skin_colors(humanoid, number)) for number in range(6)}) == 6
 
 
 # In pictures

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import NDArray
 from websockets.sync.client import connect
 
-from actuated_characters.viewer.drawing.scene import EYE, LOOK_AT
+from actuated_characters.viewer.drawing.framing import EYE, LOOK_AT
 from msgs_config.messages import topics
 from tests.support.browser import SHIFT, Browser, Pixels, needs_chromium, one_browser
 from tests.support.page_client import PageClient

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.recording import read_recording
-from actuated_characters.viewer.drawing.scene import EYE, LOOK_AT
+from actuated_characters.viewer.drawing.framing import EYE, LOOK_AT
 from tests.actuated_characters.viewer.recorded.test_page import open_folder, text_of
 from tests.actuated_characters.viewer.recorded.test_time_bar import (
     make_walk,
