@@ -13,19 +13,23 @@ from actuated_characters.viewer.drawing.colors import (
     Color,
 )
 
-_STYLE = "font-size:12px;line-height:1.45;padding:0 0.5em;display:flex;flex-wrap:wrap;gap:0 0.9em"
+_STYLE = (
+    "font-size:13px;line-height:1.4;padding:0 0.6em 0.4em;display:flex;flex-wrap:wrap;gap:0 0.9em"
+)
 _ROW = '<span style="white-space:nowrap"><span style="color:rgb{}">{}</span> {}</span>'
 _AREA, _ARROW, _POINT, _LINE = "■", "➜", "●", "▬"
 
 
-def legend(shows: Mapping[str, bool], *, has_sides: bool, one_of_several: bool) -> str:
+def legend(
+    shows: Mapping[str, bool], *, has_sides: bool, has_feet: bool, one_of_several: bool
+) -> str:
     """The legend as HTML: by what is shown (`SHOWN`), and of what is drawn."""
-    rows = "".join(_ROW.format(*row) for row in _rows(shows, has_sides, one_of_several))
+    rows = "".join(_ROW.format(*row) for row in _rows(shows, has_sides, has_feet, one_of_several))
     return f'<div style="{_STYLE}">{rows}</div>' if rows else ""
 
 
 def _rows(
-    shows: Mapping[str, bool], has_sides: bool, one_of_several: bool
+    shows: Mapping[str, bool], has_sides: bool, has_feet: bool, one_of_several: bool
 ) -> Iterator[tuple[Color, str, str]]:
     if shows["reference"]:
         yield GHOST, _AREA, "where it should be"
@@ -40,4 +44,5 @@ def _rows(
         yield PUSH, _ARROW, "push"
     if shows["balance"]:
         yield CENTRE, _POINT, "centre of mass"
+    if shows["balance"] and has_feet:
         yield SUPPORT, _LINE, "what it stands on"

@@ -27,7 +27,7 @@ _SERIES = (
     uplot.Series(label="theory", stroke="#d9480f", width=2, dash=(7.0, 5.0)),
 )
 _TIME = uplot.Scale(time=False, auto=False, range=(-_WINDOW, 0.0))
-_ASPECT = 1.9
+_ASPECT = 2.0
 _ROOM_ABOVE = (14, 8, 0, 0)  # pixels, for half of a number at the upper edge, and to the right
 _UNITS = {JointType.PRISMATIC: "m", JointType.REVOLUTE: "rad"}
 _MARGIN, _LEAST_MARGIN = 0.08, 0.01  # share of the height; m or rad

@@ -188,6 +188,7 @@ class ControlPanel:
         text = legend(
             self.shows,
             has_sides=character is not None and character.has_sides,
+            has_feet=character is not None and bool(character.character.feet),
             one_of_several=len(self._names) > 1,
         )
         if self._legend.content != text:

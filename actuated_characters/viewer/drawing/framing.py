@@ -14,7 +14,7 @@ FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
 _HALF = np.tan(0.5 * FIELD_OF_VIEW)
 # As far from the middle of a view as what is seen may reach, in its half heights; on a page of 1440
 # by 900 pixels it is so beside the panel, which is at the right.
-_UP, _LEFT, _RIGHT = 0.66 * _HALF, 1.45 * _HALF, 0.8 * _HALF
+_UP, _LEFT, _RIGHT = 0.7 * _HALF, 1.45 * _HALF, 0.8 * _HALF
 
 
 class Framing(NamedTuple):
@@ -35,11 +35,22 @@ def frame_points(corners: FloatArray) -> Framing:
     places = corners @ axes.T
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
     x, y, z = (places - middle).T
-    # each point (x, y) is seen at (x - beside, y) / (distance - z)
-    by_width = (np.max(x + _RIGHT * z) - np.min(x - _LEFT * z)) / (_RIGHT + _LEFT)
-    distance = float(max(by_width, np.max(z + np.abs(y) / _UP)))
-    least = np.max(x - _RIGHT * (distance - z))
-    most = np.min(x + _LEFT * (distance - z))
-    middle[0] += min(max(0.0, least), most)
+    distance = max(_distance(x, z, _LEFT, _RIGHT), _distance(y, z, _UP, _UP))
+    middle[0] += _shift(x, z, distance, _LEFT, _RIGHT)
+    middle[1] += _shift(y, z, distance, _UP, _UP)
     look_at = middle @ axes
     return Framing(distance, look_at + distance * near, look_at)
+
+
+def _distance(x: FloatArray, z: FloatArray, low: float, high: float) -> float:
+    """The least from which a view has points (k,) between -low and high, wherever it looks.
+
+    Of a view that looks at s from a distance d, a point (x, z), z nearer, is at (x - s) / (d - z).
+    """
+    return float(np.max(x + high * z) - np.min(x - low * z)) / (low + high)
+
+
+def _shift(x: FloatArray, z: FloatArray, distance: float, low: float, high: float) -> float:
+    """Where such a view looks: at the middle, as far as that has all."""
+    least = float(np.max(x - high * (distance - z)))
+    return min(max(0.0, least), float(np.min(x + low * (distance - z))))

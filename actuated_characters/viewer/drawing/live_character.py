@@ -44,8 +44,16 @@ class LiveCharacter(DrawnCharacter):
             self._tag = NameTag(scene, self.marks.name, rebuilt.world.name, reader, of_many=of_many)
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """The corners (3,) of a box around it, m, world, with room for what stands above it."""
+        """The corners (3,) of a box around it, m, world, with room for what stands above it.
+
+        Whatever it is doing, there is room for its rest pose, too: it may get up.
+        """
         low, high = super().bounds()
+        if self.character.layout.has_floating_base:
+            rest = self._poses(np.array(self.character.rest_position))
+            at = np.append((self.root - rest[0][0])[:2], 0.0)
+            lowest, highest = self._spheres(rest[0] + at, rest[1]).bounds(np.eye(3))
+            low, high = np.minimum(low, lowest), np.maximum(high, highest)
         return low, high + (0.0 if self._tag is None else TAG_HEIGHT) * np.array((0.0, 0.0, 1.0))
 
     def draw(self, sample: CharacterSample) -> None:

@@ -18,16 +18,18 @@ SAYS = {
 
 @pytest.mark.parametrize("name", SHOWN)
 def test_it_tells_what_is_shown_alone(name: str) -> None:
-    text = legend({**NOTHING, name: True}, has_sides=True, one_of_several=False)
+    text = legend({**NOTHING, name: True}, has_sides=True, has_feet=True, one_of_several=False)
 
     assert [each for each, said in SAYS.items() if said in text] == [name]
 
 
 def test_it_is_empty_where_nothing_is_shown_and_tells_of_sides_only_where_there_are_some() -> None:
-    assert legend(NOTHING, has_sides=True, one_of_several=True) == ""
-    assert legend({**NOTHING, "skin": True}, has_sides=False, one_of_several=True) == ""
+    assert legend(NOTHING, has_sides=True, has_feet=True, one_of_several=True) == ""
+    assert (
+        legend({**NOTHING, "skin": True}, has_sides=False, has_feet=True, one_of_several=True) == ""
+    )
     assert "each character" in legend(
-        {**NOTHING, "skin": True}, has_sides=True, one_of_several=True
+        {**NOTHING, "skin": True}, has_sides=True, has_feet=True, one_of_several=True
     )
 
 
