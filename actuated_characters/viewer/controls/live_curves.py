@@ -29,6 +29,7 @@ _SERIES = (
 _TIME = uplot.Scale(time=False, auto=False, range=(-_WINDOW, 0.0))
 _ASPECT = 2.0
 _ROOM_ABOVE = (14, 8, 0, 0)  # pixels, for half of a number at the upper edge, and to the right
+_AXIS = uplot.Axis(space=20)  # pixels between two numbers, at least
 _UNITS = {JointType.PRISMATIC: "m", JointType.REVOLUTE: "rad"}
 _MARGIN, _LEAST_MARGIN = 0.08, 0.01  # share of the height; m or rad
 _LEAST_SHARE = 0.3  # of a plot's height that curves have, or it fits anew
@@ -152,6 +153,7 @@ class ShownCurves:
                 title=title,
                 scales={"x": _TIME, "y": uplot.Scale(auto=True)},
                 legend=uplot.Legend(show=True, live=False),
+                axes=(uplot.Axis(), _AXIS),
                 aspect=_ASPECT,
                 padding=_ROOM_ABOVE,
             )
