@@ -127,8 +127,19 @@ class ShownCurves:
                 self._plots[name] = self._add_plot(name, data)
             if name in self._plots:
                 self._plots[name].data = data
-                self._fit(name, np.array(data[1:]))
+                self._scale(name, np.array(data[1:]))
         self._folder.visible = bool(self._plots)
+
+    def _scale(self, name: str, values: FloatArray) -> None:
+        """Have the page suit a plot's height, or fit it where values (curves, points) lack.
+
+        Each fit makes the plot anew, and such a one is now and then without numbers at its axes
+        until its height changes.
+        """
+        if np.isnan(values).any():
+            self._fit(name, values)
+        elif self._ranges.pop(name, None) is not None:
+            self._plots[name].scales = {"x": _TIME, "y": uplot.Scale(auto=True)}
 
     def _fit(self, name: str, values: FloatArray) -> None:
         """Have a plot's height suit values (curves, points): a page cannot where some lack."""
