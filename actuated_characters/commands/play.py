@@ -95,7 +95,13 @@ def _play(options: argparse.Namespace) -> None:
     elif options.skin or options.skin_map:
         raise ConfigurationError("--skin and --skin-map are of a browser; leave out --no-view")
     given_skin(options)  # its errors come before all the work
-    _run_scene(options, load_scene(options.scene, node_settings(options.set, NODES)))
+    scene = load_scene(options.scene, node_settings(options.set, NODES))
+    if scene.search:
+        from actuated_characters.commands.motion.search_scene import play_search
+
+        play_search(options, scene)
+        return
+    _run_scene(options, scene)
 
 
 def _print_lecture() -> None:

@@ -90,7 +90,8 @@ def _node(row: Mapping[str, Any], parent: Node | None) -> Node:
     ]
     end = np.array(row["end"], dtype=float)
     numbers = float(row["cost"]), float(row["ahead"])
-    return Node(parent, int(row["tick"]), int(row["seed"]), tuple(plans), end, *numbers)
+    motion = end[np.newaxis, : len(end) // 2]
+    return Node(parent, int(row["tick"]), int(row["seed"]), tuple(plans), end, *numbers, motion)
 
 
 def _check_key(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:

@@ -10,6 +10,7 @@ from controller_node.planner.settings import PREDICTIVE, RECORDED
 from msgs_config.character.loading import load_character
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
+from sim_node.node_settings import NodeSettings
 from sim_node.physics.settings import STEADY_CONTACTS
 
 _PLANNING = {
@@ -38,6 +39,17 @@ class Problem:
     def planned_pushes(self, plan: RunPlan) -> tuple[PlannedPush, ...]:
         """The pushes of its plan. Raises ConfigurationError if one is wrong."""
         return tuple(parse_push(text, plan) for text in self.pushes)
+
+    def check(self) -> RunPlan:
+        """Its plan, if it can be searched for; raises ActuatedCharactersError otherwise."""
+        plan = self.plan()
+        self.planned_pushes(plan)
+        if NodeSettings.of(plan.simulator).tick_period:
+            raise ConfigurationError(
+                "motion reconstruct simulates as fast as it can; it takes neither 'mode' realtime "
+                "nor a 'real_time_factor'"
+            )
+        return plan
 
     def plan(self) -> RunPlan:
         """The run in which the motion is planned, with one thread.

@@ -19,6 +19,7 @@ from actuated_characters.reconstruction.workers import Workers
 from actuated_characters.runs.plan import RunPlan
 from controller_node.references.files.reconstructed import PLAN, RECONSTRUCTION
 from controller_node.references.offsets import RecordedPlan
+from msgs_config.arrays import FloatArray
 from msgs_config.clips.reading import clip_path
 from msgs_config.errors import RunError
 from msgs_config.whole_files import write_whole
@@ -30,6 +31,8 @@ class Reconstruction:
 
     metrics: ReconstructionMetrics
     windows: int
+    positions: FloatArray  # (t, n) after each tick
+    desired: FloatArray  # (t, n) the motion's own
 
 
 @dataclass(frozen=True)
@@ -84,10 +87,10 @@ def reconstruct(
             f"{stuck_at + 1} of {windows}; {job.output} has the best attempt, "
             f"{best.tick / plan.simulation.rate_hz:.2f} s long; --resume tries again"
         )
-    metrics = verified(job.problem, job.output, best)
-    _write(job, plan, best, metrics)
+    found = verified(job.problem, job.output, best)
+    _write(job, plan, best, found.metrics)
     checkpoint.unlink(missing_ok=True)
-    return Reconstruction(metrics, windows)
+    return Reconstruction(found.metrics, windows, found.positions, found.desired)
 
 
 def _write(job: Job, plan: RunPlan, best: Node, metrics: ReconstructionMetrics | None) -> None:

@@ -15,7 +15,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from actuated_characters.reconstruction.tree import Node
-from actuated_characters.reconstruction.world import Branch, Grown
+from actuated_characters.reconstruction.world import Branch, Grown, Lost
+from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, SimulationError
 
 _WINDOWS_IN_COST = 4  # windows whose costs count beside what is ahead
@@ -57,6 +58,16 @@ class SearchSettings:
         }
 
 
+@dataclass(frozen=True)
+class Tried:
+    """One of a window's worlds, and what has become of it."""
+
+    parent: Node | None  # None: it began in the first state
+    motion: FloatArray  # (k + 1, n) positions in the window, from the state that it began in on
+    node: Node | None  # None: it is lost
+    rank: int | None  # 0 is the best of those that are kept; None: it is not kept
+
+
 @dataclass
 class Progress:
     """Where a search is; all that it needs to go on, beside its problem and settings."""
@@ -65,6 +76,7 @@ class Progress:
     failures: int = 0  # windows in which all worlds were lost
     stuck: int = 0  # those failures since the furthest window was reached
     best: Node | None = None  # the best node of the furthest window that was reached
+    tried: tuple[Tried, ...] = ()  # the worlds of the window before, to be looked at
 
     @property
     def window(self) -> int:
@@ -75,7 +87,7 @@ class Progress:
 class Worlds(Protocol):
     """Grow branches."""
 
-    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | None]:
+    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | Lost]:
         """What becomes of branches, in their order."""
 
 
@@ -97,7 +109,8 @@ def search(
     """
     while progress.window < windows:
         furthest = 0 if progress.best is None else len(progress.best.path)
-        nodes = _next_level(worlds, settings, progress)
+        progress.tried = _next_window(worlds, settings, progress)
+        nodes = kept_nodes(progress.tried)
         if nodes:
             progress.levels.append(nodes)
             if progress.window > furthest:
@@ -119,6 +132,12 @@ def search(
     return None
 
 
+def kept_nodes(worlds: Sequence[Tried]) -> list[Node]:
+    """The nodes that are kept of a window, the best first; none if all its worlds are lost."""
+    ranked = {each.rank: each.node for each in worlds if each.node is not None}
+    return [ranked[rank] for rank in sorted(rank for rank in ranked if rank is not None)]
+
+
 def result(progress: Progress) -> Node | None:
     """The best path that was found, to the last level or to the furthest window that was reached.
 
@@ -129,8 +148,8 @@ def result(progress: Progress) -> Node | None:
     return min(progress.levels[-1], key=lambda node: float(np.mean([n.cost for n in node.path])))
 
 
-def _next_level(worlds: Worlds, settings: SearchSettings, progress: Progress) -> list[Node]:
-    """The nodes that are kept of the next window, the best first; none if all are lost."""
+def _next_window(worlds: Worlds, settings: SearchSettings, progress: Progress) -> tuple[Tried, ...]:
+    """What becomes of the next window's worlds; the best of those that are not lost are kept."""
     parents: list[Node | None] = list(progress.levels[-1]) if progress.levels else [None]
     _come_again(worlds, [node for node in parents if node is not None and node.place is None])
     count = settings.worlds
@@ -140,25 +159,32 @@ def _next_level(worlds: Worlds, settings: SearchSettings, progress: Progress) ->
         Branch(None if parent is None else parent.place, (seed,))
         for parent, seed in zip(owners, seeds, strict=True)
     ]
+    all_grown = list(worlds.grow(branches))
     nodes = [
-        _node(parent, seed, grown)
-        for parent, seed, grown in zip(owners, seeds, worlds.grow(branches), strict=True)
-        if grown is not None
+        None if isinstance(grown, Lost) else _node(parent, seed, grown)
+        for parent, seed, grown in zip(owners, seeds, all_grown, strict=True)
     ]
-    return sorted(nodes, key=_value)[: settings.survivors]  # equal nodes stay in their order
+    alive = [node for node in nodes if node is not None]
+    kept = sorted(alive, key=value)[: settings.survivors]  # equal nodes stay in their order
+    ranks = {id(node): rank for rank, node in enumerate(kept)}
+    return tuple(
+        Tried(parent, grown.motion, node, ranks.get(id(node)))
+        for parent, grown, node in zip(owners, all_grown, nodes, strict=True)
+    )
 
 
 def _come_again(worlds: Worlds, nodes: Sequence[Node]) -> None:
     """Have places of nodes, after a search was resumed."""
     for node, grown in zip(nodes, worlds.grow([node.again() for node in nodes]), strict=True):
-        if grown is None or grown.end.tobytes() != node.end.tobytes():
+        if isinstance(grown, Lost) or grown.end.tobytes() != node.end.tobytes():
             raise SimulationError(
                 "what the checkpoint says is not repeated; it is of another version or machine"
             )
         node.place = grown.place
 
 
-def _value(node: Node) -> float:
+def value(node: Node) -> float:
+    """What decides who is kept: the costs of a node's last windows, and of what is ahead."""
     recent = [each.cost for each in node.path[-_WINDOWS_IN_COST:]]
     return float(np.mean(recent)) + node.ahead
 
@@ -169,4 +195,5 @@ def _seed(settings: SearchSettings, progress: Progress, world: int) -> int:
 
 def _node(parent: Node | None, seed: int, grown: Grown) -> Node:
     place = grown.place
-    return Node(parent, place.tick, seed, grown.plans, grown.end, grown.cost, grown.ahead, place)
+    numbers = grown.cost, grown.ahead
+    return Node(parent, place.tick, seed, grown.plans, grown.end, *numbers, grown.motion, place)

@@ -18,6 +18,7 @@ class Node:
     end: FloatArray  # (2 n,) position and velocity
     cost: float  # mean cost of the states of its window
     ahead: float  # cost of going on as planned
+    motion: FloatArray  # (k + 1, n) positions, from its parent's end on; resumed, its end alone
     place: Place | None = None  # other worlds can go on from it as long as it is kept
 
     @property

@@ -31,7 +31,16 @@ class ReconstructionMetrics:
     state_hash: str
 
 
-def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """A reconstruction that was simulated again."""
+
+    metrics: ReconstructionMetrics
+    positions: FloatArray  # (t, n) after each tick
+    desired: FloatArray  # (t, n) the motion's own
+
+
+def verified(problem: Problem, file: Path, best: Node) -> Verified:
     """Run a reconstruction's file from a fresh world, and measure it.
 
     Raises:
@@ -57,7 +66,7 @@ def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
     summary = measurement.summary(wall_time=0.0)
     path, desired = np.array(positions), np.array(motions)
     apart = centre_path(plan.character, path) - centre_path(plan.character, desired)
-    return ReconstructionMetrics(
+    metrics = ReconstructionMetrics(
         ticks=len(positions),
         fell=bool(summary["fell"]),
         centre_error_mean_m=float(np.linalg.norm(apart, axis=1).mean()),
@@ -65,6 +74,7 @@ def verified(problem: Problem, file: Path, best: Node) -> ReconstructionMetrics:
         least_root_height_m=float(path[:, 2].min()),
         state_hash=measurement.state_hash,
     )
+    return Verified(metrics, path, desired)
 
 
 def _check_equal(state: StampedState, node: Node, time: float) -> None:

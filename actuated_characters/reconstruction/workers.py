@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 
 from actuated_characters.reconstruction.problem import Problem
-from actuated_characters.reconstruction.world import Branch, Grown, TrialWorld
+from actuated_characters.reconstruction.world import Branch, Grown, Lost, TrialWorld
 from msgs_config.errors import RunError
 from msgs_config.runtime.worker_processes import WorkerProcesses
 
@@ -36,7 +36,7 @@ class Workers:
         if self._own is not None:
             self._own.close()
 
-    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | None]:
+    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | Lost]:
         """What becomes of branches, in their order.
 
         Raises:
@@ -68,7 +68,7 @@ def _begin(problem: Problem, window_ticks: int) -> None:
     _engine = problem, window_ticks
 
 
-def _grow(branch: Branch) -> Grown | None:
+def _grow(branch: Branch) -> Grown | Lost:
     global _world
     if _world is None:
         assert _engine is not None

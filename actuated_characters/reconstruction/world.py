@@ -41,9 +41,17 @@ class Grown:
 
     place: Place
     plans: tuple[tuple[int, Offsets], ...]  # plans made in it, each with the tick when it begins
+    motion: FloatArray  # (k + 1, n) positions in the window, from the state that it began in on
     end: FloatArray  # (2 n,) position and velocity
     cost: float  # mean cost of the window's states
     ahead: float  # cost of going on as planned
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What is left of a branch that in a window diverged, or went too far from the motion."""
+
+    motion: FloatArray  # (k + 1, n) positions in the window until then
 
 
 class TrialWorld:
@@ -72,8 +80,8 @@ class TrialWorld:
         """End the engine."""
         self._simulation.close()
 
-    def grow(self, branch: Branch) -> Grown | None:
-        """Simulate a branch's windows; None if it is lost."""
+    def grow(self, branch: Branch) -> Grown | Lost:
+        """Simulate a branch's windows, as far as it is not lost."""
         place = branch.place
         if place is None:
             self._simulation.close()  # only a new world returns to a state without a step
@@ -83,21 +91,21 @@ class TrialWorld:
         self._controller.begin_episode(self._episode_ns)  # it forgets what it planned before
         tick = 0 if place is None else place.tick
         planner = self._planner.snapshot() if place is None else place.planner
-        grown = None
         for seed in branch.seeds:
             self._planner.restore(planner, seed)
             grown = self._window(tick, min(tick + self._window_ticks, self.plan.ticks))
-            if grown is None:
-                return None
+            if isinstance(grown, Lost):
+                break
             tick, planner = grown.place.tick, grown.place.planner
         return grown
 
-    def _window(self, first: int, last: int) -> Grown | None:
+    def _window(self, first: int, last: int) -> Grown | Lost:
         """Simulate the ticks of a window."""
         plans: list[tuple[int, Offsets]] = []
         costs: list[float] = []
         before, gains = self._planner.plan, self._controller.settings.gains
         (simulated,) = self._simulation.characters
+        motion = [simulated.state.position]
         pushes = push_schedule(self.plan, self._pushes)
         for tick in range(first, last):
             effort, _ = self._controller.compute_effort(simulated.state, self._episode_ns)
@@ -111,15 +119,17 @@ class TrialWorld:
                     [pushes.take(self._simulation.tick)],
                 )
             except SimulationError:
-                return None
+                return Lost(np.array(motion))
+            motion.append(simulated.state.position)
             if (tick + 1) % self._period == 0 or tick + 1 == last:
                 costs.append(self._planner.cost(tick + 1, simulated.state, gains, self._desired))
         if self._is_lost(last):
-            return None
+            return Lost(np.array(motion))
         state = simulated.state
         return Grown(
             Place(last, self._simulation.snapshot(), self._planner.snapshot()),
             tuple(plans),
+            np.array(motion),
             np.concatenate((state.position, state.velocity)),
             float(np.mean(costs)),
             self._planner.cost_ahead(last, state, gains, self._desired),

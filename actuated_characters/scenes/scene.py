@@ -11,6 +11,7 @@ from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.shared_parameters import CharacterSource, SharedSettings
 
 SIMULATOR, CONTROLLER, VIEWER = "sim_node", "controller_node", "viewer"
+SEARCH = "motion_reconstruct"  # no node: a command, which has its parameters in the same way
 _FOLDER = Path(__file__).parent / "data"
 _SUFFIX = ".yaml"
 _PARAMETERS = "ros__parameters"
@@ -24,6 +25,7 @@ _DEFAULTS: Parameters = {
     "wrench_duration": 0.05,  # s; short, so that a drag follows the pointer
     "ball_lifetime": 20.0,  # s
 }
+_DEFAULTS_OF_SEARCH: Parameters = {"rate": 240}  # Hz; it takes as long as it takes
 _OF_CHARACTER = tuple(each.name for each in CharacterSource.declared())
 _OF_BOTH = tuple(each.name for each in SharedSettings.declared())
 
@@ -36,6 +38,8 @@ class Scene:
     title: str  # what there is to see, in one line
     nodes: Mapping[str, Parameters]  # the simulator's first, by names below its namespace
     viewer: Mapping[str, object] = field(default_factory=dict)  # parameters of the page
+    search: Mapping[str, object] = field(default_factory=dict)
+    """Parameters of the search for a motion that it shows; of a world that runs there are none."""
 
     @property
     def simulator(self) -> Parameters:
@@ -79,7 +83,8 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
     given = _beside(path, _parameters_of(SIMULATOR, content)) | settings.get(SIMULATOR, {})
     if not given:
         raise ConfigurationError(f"{path}: there are no parameters of '{SIMULATOR}'")
-    simulator = _DEFAULTS | given
+    search = _beside(path, _parameters_of(SEARCH, content))
+    simulator = (_DEFAULTS_OF_SEARCH if search else _DEFAULTS) | given
     nodes, names = {SIMULATOR: simulator}, _names_in(simulator)
     for character in names or [""]:
         node = f"{character}/{CONTROLLER}".lstrip("/")
@@ -90,7 +95,8 @@ def load_scene(name: str, settings: Mapping[str, Parameters] | None = None) -> S
             raise ConfigurationError(
                 f"{path}: '{_OPPONENT}' of '{node}' is {opponent}, which is no other character"
             )
-    return Scene(path.stem, _title(text), nodes, _beside(path, _parameters_of(VIEWER, content)))
+    viewer = _beside(path, _parameters_of(VIEWER, content))
+    return Scene(path.stem, _title(text), nodes, viewer, search)
 
 
 def _agreed(simulator: Parameters, character: str) -> Parameters:

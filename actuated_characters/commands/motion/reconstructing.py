@@ -2,16 +2,11 @@
 
 import argparse
 import os
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
-from actuated_characters.commands.common.progress import progress_bar
 from actuated_characters.commands.common.result_file import check_not_lost, result_file
 from actuated_characters.commands.common.settings import (
-    CHARACTER,
     NODES,
     Commands,
     add_character,
@@ -19,12 +14,13 @@ from actuated_characters.commands.common.settings import (
     add_inputs,
     node_settings,
 )
-from actuated_characters.commands.common.tables import make_facts_table
+from actuated_characters.commands.common.skin_options import given_skin
+from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
+from msgs_config.runtime.extras import require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
-    from actuated_characters.reconstruction.reconstruction import Job, Reconstruction
-    from actuated_characters.reconstruction.search import Progress as SearchProgress
+    from actuated_characters.reconstruction.reconstruction import Job
 
 _FOLDER, _SUFFIX = Path("reconstructions"), ".json"
 _OWN = ("planner", "reference", "clip", "plan.seed", "plan.workers", "planning_delay_ticks")
@@ -41,7 +37,10 @@ def add_motion_reconstruct(commands: "Commands[argparse.ArgumentParser]") -> Non
         "window, until the character does it without root assistance (sampling-based motion "
         "control, Liu et al. 2010, with planned samples). The result is a clip file with the plan "
         "and the parameters of its run: play it with `run --clip FILE`.",
-        ["motion reconstruct --clip walk --cycles 4 --output walk.json"],
+        [
+            "motion reconstruct --clip walk --cycles 4 --output walk.json",
+            "motion reconstruct --clip cartwheel --view",
+        ],
     )
     add_character(command)
     command.add_argument("--clip", default="walk", help="name of a clip, or a file (%(default)s)")
@@ -86,21 +85,24 @@ def _add_search(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--workers", type=int, metavar="N", help="processes (as many as there are cores)"
     )
+    command.add_argument(
+        "--view",
+        action="store_true",
+        help="show in a browser what becomes of the worlds, and in the end what was found, until "
+        "Ctrl-C (needs the extra 'view'); where, is printed",
+    )
+    add_server(command)
 
 
 def _reconstruct(options: argparse.Namespace) -> None:
-    from actuated_characters.reconstruction.reconstruction import reconstruct
+    from actuated_characters.commands.motion.searching import run_search
 
-    job = _job(options)
-    with progress_bar(f"{job.problem.character}: {job.problem.clip}", 1, "windows") as bar:
-
-        def report(progress: "SearchProgress", windows: int) -> None:
-            state = f"best cost {progress.levels[-1][0].cost:.3g}" if progress.levels else ""
-            task = bar.task_ids[0]
-            bar.update(task, completed=progress.window, total=windows, state=state)
-
-        found = reconstruct(job, report)
-    _report(job, found)
+    if options.view:
+        require_extra("view", "--view")
+    elif options.skin or options.skin_map:
+        raise ConfigurationError("--skin and --skin-map are of --view")
+    given_skin(options)  # its errors come before all the work
+    run_search(_job(options), server_parameters(options) if options.view else None)
 
 
 def _job(options: argparse.Namespace) -> "Job":
@@ -108,7 +110,6 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import SearchSettings
-    from sim_node.node_settings import NodeSettings
 
     workers = options.workers if options.workers is not None else os.cpu_count() or 1
     if workers < 1:
@@ -131,13 +132,7 @@ def _job(options: argparse.Namespace) -> "Job":
     )
     settings = SearchSettings(options.worlds, options.kept, options.window, options.seed)
     settings.check()
-    plan = problem.plan()  # mistakes are reported before anything begins
-    problem.planned_pushes(plan)
-    if NodeSettings.of(plan.simulator).tick_period:
-        raise ConfigurationError(
-            "motion reconstruct simulates as fast as it can; it takes neither 'mode' realtime nor "
-            "a 'real_time_factor'"
-        )
+    problem.check()  # mistakes are reported before anything begins
     if options.output is None:
         output.parent.mkdir(exist_ok=True)
     return Job(problem, settings, output, workers, options.resume)
@@ -152,22 +147,3 @@ def _output(options: argparse.Namespace) -> Path:
     files = (output, checkpoint_path(output))
     check_not_lost(files, resume=options.resume, overwrite=options.overwrite)
     return output
-
-
-def _report(job: "Job", found: "Reconstruction") -> None:
-    """Print the figures, and the command that plays the file."""
-    metrics = found.metrics
-    facts = {
-        "length": f"{job.problem.duration:g} s, {metrics.ticks} ticks, {found.windows} windows",
-        "centre of mass error, mean": f"{metrics.centre_error_mean_m:.3f} m",
-        "joint error, mean": f"{metrics.joint_error_mean_rad:.3f} rad",
-        "lowest root": f"{metrics.least_root_height_m:.3f} m",
-        "fell": str(metrics.fell),
-        "state_hash": metrics.state_hash,
-    }
-    console = Console()
-    console.print(make_facts_table(str(job.output), facts.items()))
-    command = f"actuated_characters run --clip {shlex.quote(str(job.output))}"
-    if job.problem.character != CHARACTER:
-        command += f" --character {shlex.quote(job.problem.character)}"
-    console.print("play it over topics:", command, soft_wrap=True, markup=False)

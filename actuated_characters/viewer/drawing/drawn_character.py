@@ -80,6 +80,7 @@ class DrawnCharacter:
         ]
         self._shape_counts = [len(own) for own in shapes]
         self._colors = [[np.array(each.color_rgba[:3]) * 255.0 for each in own] for own in shapes]
+        self._painted: FloatArray | None = None  # (3,) one colour in place of these, 0 to 255
         self._skin: DrawnSkin | None = None
         self.has_sides = False
         """Whether the right side of its skin has a colour of its own."""
@@ -196,6 +197,21 @@ class DrawnCharacter:
         self._color(sample.state.effort)
         self.marks.draw(sample, self._links, self._model, self.shows)
 
+    def paint(self, color: tuple[int, int, int] | None) -> None:
+        """Give all links one colour, 0 to 255, or each its own again."""
+        self._painted = None if color is None else np.array(color, dtype=float)
+        self._levels = [-1] * len(self._levels)  # none is right any more
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether it is seen at all."""
+        return bool(self._all.visible)
+
+    def show(self, *, shown: bool) -> None:
+        """Have all of it be seen, or nothing."""
+        if self.is_shown != shown:
+            self._all.visible = shown
+
     def _draw_ghost(self, position: FloatArray | None) -> None:
         """Draw the reference at a position (n,); None: there is none."""
         if position is not None:
@@ -224,7 +240,8 @@ class DrawnCharacter:
             if level == self._levels[row]:
                 continue
             self._levels[row] = level
-            for mesh, color in zip(self._meshes[row], self._colors[row], strict=True):
+            for mesh, own in zip(self._meshes[row], self._colors[row], strict=True):
+                color = own if self._painted is None else self._painted
                 mesh.color = _rgb(color + (np.array(STRAIN) - color) * (level / _LEVELS))
 
     def point(self, row: int, local: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from msgs_config.arrays import FloatArray
 EYE, LOOK_AT = (2.6, -2.6, 1.5), (0.0, 0.0, 0.8)
 """Of the camera until a character is there, m, from the point on the ground below."""
 
+RIGHT: FloatArray = np.array((0.5**0.5, 0.5**0.5, 0.0))  # of a view from there
 FIELD_OF_VIEW = np.radians(45.0)  # from the upper edge to the lower one
 
 _HALF = np.tan(0.5 * FIELD_OF_VIEW)

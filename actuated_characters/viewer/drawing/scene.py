@@ -91,7 +91,9 @@ class BrowserScene:
         self.api.configure_fog(near, far, color=_HAZE_COLOR)
 
     def frame_characters(
-        self, characters: Sequence[DrawnCharacter], others: Sequence[FloatArray] = ()
+        self,
+        characters: Sequence[DrawnCharacter],
+        others: Sequence[FloatArray] = (),
     ) -> None:
         """Have all pages see the characters where they are now, as large as fits.
 

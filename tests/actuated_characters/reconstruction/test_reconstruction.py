@@ -22,7 +22,7 @@ from actuated_characters.reconstruction.problem import Problem, duration_of
 from actuated_characters.reconstruction.reconstruction import Job, Reconstruction, reconstruct
 from actuated_characters.reconstruction.search import Progress, SearchSettings, result, search
 from actuated_characters.reconstruction.workers import Workers
-from actuated_characters.reconstruction.world import Branch, Grown, Place, TrialWorld
+from actuated_characters.reconstruction.world import Branch, Grown, Lost, Place, TrialWorld
 from actuated_characters.runs.planned.wrenches import parse_pushes_within
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from tests.support.ros import wait_until
@@ -46,9 +46,9 @@ def world() -> Iterator[TrialWorld]:
     world.close()
 
 
-def same(one: Grown | None, other: Grown | None) -> bool:
+def same(one: Grown | Lost, other: Grown | Lost) -> bool:
     """Whether two worlds ended in the same state, with the same plans, to the bit."""
-    assert one is not None and other is not None
+    assert isinstance(one, Grown) and isinstance(other, Grown)
     return (
         one.end.tobytes() == other.end.tobytes()
         and [tick for tick, _ in one.plans] == [tick for tick, _ in other.plans]
@@ -65,7 +65,7 @@ def same(one: Grown | None, other: Grown | None) -> bool:
 
 def test_from_a_place_it_goes_on_as_if_it_had_never_left_it(world: TrialWorld) -> None:
     first = world.grow(Branch(None, (1,)))
-    assert first is not None
+    assert isinstance(first, Grown)
     at_once = world.grow(Branch(None, (1, 2)))
     world.grow(Branch(None, (5, 6)))
 
@@ -77,7 +77,7 @@ def test_from_a_place_it_goes_on_as_if_it_had_never_left_it(world: TrialWorld) -
 
 def test_other_processes_get_the_same_numbers_wherever_they_begin(world: TrialWorld) -> None:
     first = world.grow(Branch(None, (1,)))
-    assert first is not None
+    assert isinstance(first, Grown)
     branches = [Branch(first.place, (seed,)) for seed in (1, 2)] + [Branch(None, (3,))]
     alone = [world.grow(branch) for branch in branches]
 
@@ -111,11 +111,14 @@ def test_a_world_is_lost_in_which(
     problem = Problem("humanoid", "kick", 1.5, simulator, {**QUICK, **controller})
     whole = TrialWorld(problem, 360)
 
-    assert whole.grow(Branch(None, (1,))) is None
+    assert isinstance(whole.grow(Branch(None, (1,))), Lost)
     whole.close()
 
 
 # The search
+
+
+LOST = Lost(np.zeros((1, 1)))
 
 
 class Numbered:
@@ -125,7 +128,7 @@ class Numbered:
         self.deadly = deadly  # tick from which all are lost the first time
         self.grown = 0
 
-    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | None]:
+    def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | Lost]:
         """The number so far stands in the end state."""
         for branch in branches:
             tick = 0 if branch.place is None else branch.place.tick
@@ -134,7 +137,7 @@ class Numbered:
             failures = branch.seeds[-1] // 2**10 % 2**10
             fails = place.tick >= self.deadly and not failures
             cost = float(branch.seeds[-1] % 2**10)
-            yield None if fails else Grown(place, (), np.zeros(1), cost, 0.0)
+            yield LOST if fails else Grown(place, (), LOST.motion, np.zeros(1), cost, 0.0)
 
 
 def progress_of(
@@ -165,9 +168,9 @@ def test_where_all_are_lost_it_goes_back_and_tries_others() -> None:
 
 def test_who_is_stuck_gives_up_and_has_the_furthest_window() -> None:
     class Deadly(Numbered):
-        def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | None]:
+        def grow(self, branches: Sequence[Branch]) -> Iterator[Grown | Lost]:
             for grown in super().grow(branches):
-                yield None if grown is not None and grown.place.tick > 3 else grown
+                yield LOST if isinstance(grown, Grown) and grown.place.tick > 3 else grown
 
     stuck_at, progress = progress_of(Deadly(), 6, SearchSettings(worlds=2, survivors=1, tries=3))
 
