@@ -23,6 +23,7 @@ from tests.support.browser import Browser, one_browser
 from tests.support.ros import Process, wait_until
 
 SIZE = (1440, 900)  # pixels
+SEARCHED = 400.0  # s that a search may take, with all of its windows
 PATIENCE = 120.0  # s that a page may take until it shows a simulated time
 QUALITY = 70  # of the pictures, percent
 WATCHED = {"walker": 5.0, "brawl": 9.0, "crowd": 12.0, "gains": 8.0, "underactuated": 5.0}
@@ -49,7 +50,22 @@ def pour(browser: Browser) -> None:
     time.sleep(2.0)
 
 
-ACTS: Mapping[str, Callable[[Browser], None]] = {"lift": reset, "delay": reset, "ragdoll": pour}
+def look_back(browser: Browser) -> None:
+    """Wait until a search has found its motion, and show a window in which worlds are lost."""
+    found = "document.body.innerText.includes('the one that stays')"
+    wait_until(lambda: browser.evaluate(found), "what was found", SEARCHED)
+    browser.click("Earlier")
+    time.sleep(1.0)
+    browser.click("Earlier")
+    time.sleep(5.0)
+
+
+ACTS: Mapping[str, Callable[[Browser], None]] = {
+    "lift": reset,
+    "delay": reset,
+    "ragdoll": pour,
+    "samcon": look_back,
+}
 """What is done on the pages of some scenes before their pictures."""
 
 

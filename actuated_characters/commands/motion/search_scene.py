@@ -56,12 +56,12 @@ def play_search(options: argparse.Namespace, scene: Scene) -> None:
 def _job(scene: Scene, output: Path, most_seconds: float) -> Job:
     """The search that a scene describes, of a motion that lasts at most so many s."""
     motion = SearchedMotion.given(scene.search)
+    if scene.characters:
+        raise ConfigurationError(f"scene '{scene.name}': a search is for one character's motion")
     simulator, controller = (
         {name: value for name, value in scene.nodes[node].items() if name != "character"}
         for node in (SIMULATOR, CONTROLLER)
     )
-    if scene.characters:
-        raise ConfigurationError(f"scene '{scene.name}': a search is for one character's motion")
     character = str(scene.simulator.get("character", ""))
     duration = min(duration_of(character, motion.clip, motion.cycles), most_seconds)
     problem = Problem(character, motion.clip, duration, simulator, controller, motion.push)

@@ -21,7 +21,7 @@ from actuated_characters.viewer.web.server import (
     start_server,
     stop_server,
 )
-from msgs_config.errors import ActuatedCharactersError, RunError
+from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.worker_processes import WorkerProcesses
 
 if TYPE_CHECKING:  # it is subscripted for the type checker alone
@@ -68,18 +68,18 @@ class SearchPage:
     def show(self, news: News) -> None:
         """Have it show what was found; says once if it has ended, for the search goes on."""
         self._news.put(news)
-        if self._shown.done() and not self._end_was_told:
-            self._end_was_told = True
-            print(f"the search goes on unseen; {self._reason()}", flush=True)
+        if self._shown.done():
+            self._tell_end("the search goes on unseen; ")
 
     def wait(self) -> None:
-        """Wait until its process ends, which it does not of itself.
-
-        Raises:
-            RunError: it has ended.
-        """
+        """Wait until its process ends, which it does not of itself, and say so."""
         self._shown.exception()
-        raise RunError(self._reason())
+        self._tell_end("")
+
+    def _tell_end(self, beginning: str) -> None:
+        if not self._end_was_told:
+            self._end_was_told = True
+            print(f"{beginning}{self._reason()}", flush=True)
 
     def _reason(self) -> str:
         """Why its process has ended."""

@@ -17,7 +17,7 @@ EARLIER, LATER, NEWEST = "Earlier", "Later", "Newest"
 _ABOUT = (
     "**Sampling** (SAMCON): in each window all worlds go on from the states that were kept, each "
     "with other samples. The best are kept, and the next window goes on from these. Behind are the "
-    "worlds of a window, five times slower than real time, with their costs; before them is the "
+    "worlds of a window, four times slower than real time, with their costs; before them is the "
     "best path so far, in real time."
 )
 _MEANINGS = {

@@ -79,9 +79,9 @@ def test_what_was_found_is_a_path_of_the_last_windows_kept_worlds(seen: Seen) ->
     _, told, found = seen
 
     news = found_news(found)
-    ends = [world.positions[-1] for world in told[-1].worlds if world.fate in (Fate.BEST, Fate.KEPT)]
+    kept = [world for world in told[-1].worlds if world.fate in (Fate.BEST, Fate.KEPT)]
     assert len(news.positions) == TICKS
-    assert any(np.array_equal(news.positions[-1], end) for end in ends)
+    assert any(np.array_equal(news.positions[-1], world.positions[-1]) for world in kept)
 
 
 def test_worlds_that_are_lost_are_told_of_with_their_motion(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def new_search(player: SearchPlayer) -> None:
 
 
 def shown(player: SearchPlayer) -> dict[str, tuple[int, int, int]]:
-    """The words over the heads of the figures of worlds, with a colour that all their links have."""
+    """The words over the heads of worlds' figures, with a colour that all their links have."""
     found = {}
     for figure in player.stage._worlds:
         if figure.is_shown:
