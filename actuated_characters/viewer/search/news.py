@@ -25,6 +25,11 @@ class Fate(Enum):
         return self.value[1]
 
 
+def as_cost(cost: float) -> str:
+    """A cost as text of at least two digits, without an exponent."""
+    return f"{cost:.0f}" if cost >= 10.0 else f"{cost:.1f}"
+
+
 @dataclass(frozen=True, eq=False)
 class WorldNews:
     """One world of a window."""

@@ -11,7 +11,7 @@ from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
 from actuated_characters.viewer.drawing.drawn_character import GHOST
 from actuated_characters.viewer.drawing.scene import BrowserScene
-from actuated_characters.viewer.search.news import Fate, MotionNews, WindowNews
+from actuated_characters.viewer.search.news import Fate, MotionNews, WindowNews, as_cost
 
 EARLIER, LATER, NEWEST = "Earlier", "Later", "Newest"
 _ABOUT = (
@@ -80,9 +80,9 @@ class SearchPanel:
         if not kept:
             sentences.append("**All are lost**: the search goes back to an earlier window.")
         if costs := sorted(each.cost for each in window.worlds if each.cost is not None):
-            sentences.append(f"Costs {costs[0]:.3g} to {costs[-1]:.3g}.")
+            sentences.append(f"Costs {as_cost(costs[0])} to {as_cost(costs[-1])}.")
         sentences.append(
-            f"So far all were lost in {window.failures} windows."
+            f"So far all were lost {window.failures} times."
             if window.failures
             else "So far in no window all were lost."
         )

@@ -5,7 +5,7 @@ import numpy as np
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.drawing.scene import RIGHT, WORLD, BrowserScene
 from actuated_characters.viewer.search.figure import Figure
-from actuated_characters.viewer.search.news import MotionNews, WindowNews, WorldNews
+from actuated_characters.viewer.search.news import MotionNews, WindowNews, WorldNews, as_cost
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 
@@ -127,4 +127,4 @@ def world_places(count: int) -> FloatArray:
 
 
 def _word(world: WorldNews) -> str:
-    return world.fate.word if world.cost is None else f"{world.fate.word} {world.cost:.3g}"
+    return world.fate.word if world.cost is None else f"{world.fate.word} {as_cost(world.cost)}"

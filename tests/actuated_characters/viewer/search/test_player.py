@@ -28,7 +28,7 @@ def moving(ticks: int, metres: float = 0.1) -> np.ndarray:
 
 def window(number: int, fates: tuple[Fate, ...] = FATES, failures: int = 0) -> WindowNews:
     worlds = tuple(
-        WorldNews(moving(25, 0.1 * k), fate, None if fate is Fate.LOST else 2.0 + k)
+        WorldNews(moving(25, 0.1 * k), fate, None if fate is Fate.LOST else 2.0 + 11.0 * k)
         for k, fate in enumerate(fates)
     )
     best = moving(24 * number)
@@ -70,14 +70,14 @@ def test_each_world_has_the_word_and_the_colour_of_what_becomes_of_it(
     player.draw(0.0)
 
     assert shown(player) == {
-        "kept 2": Fate.KEPT.color,
-        "best 3": Fate.BEST.color,
-        "dropped 4": Fate.DROPPED.color,
+        "kept 2.0": Fate.KEPT.color,
+        "best 13": Fate.BEST.color,
+        "dropped 24": Fate.DROPPED.color,
         "lost": Fate.LOST.color,
     }
     assert len({fate.color for fate in Fate}) == len(Fate)
     assert "**humanoid: kick**, up to 0.10 s" in player.panel.text
-    assert "**Window 1 of 5**: 4 worlds, 2 kept, 1 lost. Costs 2 to 4." in player.panel.text
+    assert "**Window 1 of 5**: 4 worlds, 2 kept, 1 lost. Costs 2.0 to 24." in player.panel.text
     assert "So far in no window all were lost." in player.panel.text
 
 
@@ -86,7 +86,7 @@ def test_where_all_are_lost_it_says_that_the_search_goes_back(player: SearchPlay
     player.draw(0.0)
 
     assert "0 kept, 4 lost. **All are lost**: the search goes back" in player.panel.text
-    assert "So far all were lost in 1 windows." in player.panel.text
+    assert "So far all were lost 1 times." in player.panel.text
 
 
 def test_worlds_begin_in_their_places_and_the_best_path_is_before_them(
