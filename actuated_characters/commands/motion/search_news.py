@@ -88,12 +88,10 @@ def _positions(node: Node | None, most: int) -> FloatArray:
     """
     parts: list[FloatArray] = []
     while node is not None and sum(map(len, parts)) < most:
-        parts.append(node.motion if node.parent is None else node.motion[1:])
-        if len(node.motion) == 1:
-            break
-        node = node.parent
-    parts = [each for each in parts[::-1] if len(each)]
-    return np.concatenate(parts)[-most:] if parts else np.empty((0, 0))
+        begins = node.parent is None or len(node.motion) == 1
+        parts.append(node.motion if begins else node.motion[1:])
+        node = None if begins else node.parent
+    return np.concatenate(parts[::-1])[-most:] if parts else np.empty((0, 0))
 
 
 def _desired(plan: RunPlan, best: Node | None, count: int) -> FloatArray:

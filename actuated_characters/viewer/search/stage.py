@@ -3,7 +3,8 @@
 import numpy as np
 
 from actuated_characters.render.skin.given import GivenSkin
-from actuated_characters.viewer.drawing.scene import RIGHT, WORLD, BrowserScene
+from actuated_characters.viewer.drawing.framing import RIGHT
+from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
 from actuated_characters.viewer.search.figure import Figure
 from actuated_characters.viewer.search.news import MotionNews, WindowNews, WorldNews, as_cost
 from msgs_config.arrays import FloatArray
@@ -17,7 +18,6 @@ _SPEED = 0.25  # of real time, at which a window is seen
 _STANDS = 0.8  # s that the worlds stand at the end of a window
 _PAUSE = 0.6  # s of rest before a motion begins again
 _TOWARDS: FloatArray = np.array((0.5**0.5, -(0.5**0.5)))  # the camera, over the ground
-_SHARE, _ASIDE = 0.85, 0.16  # of the view's height: figures are large, and beside the panel
 _STILL: FloatArray = np.zeros(2)
 
 
@@ -83,10 +83,7 @@ class Stage:
         """Have the cameras see all figures, once their number is another one."""
         if self._framed != len(shown):
             self._framed = len(shown)
-            if self._window is None:
-                self._scene.frame_characters(shown)
-            else:
-                self._scene.frame_characters(shown, share=_SHARE, aside=_ASIDE)
+            self._scene.frame_characters(shown)
 
     def _draw_window(self, window: WindowNews) -> None:
         elapsed = (self._time - self._begun) % self._window_seconds(window)

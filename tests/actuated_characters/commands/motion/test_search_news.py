@@ -1,5 +1,6 @@
 """What a page is told of a search, by the real search with the real engine."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +118,26 @@ def test_of_many_worlds_the_kept_ones_and_others_are_shown(seen: Seen, tmp_path:
     (only,) = told
     assert (len(only.worlds), only.hidden) == (12, 2)
     assert [world.fate for world in only.worlds].count(Fate.DROPPED) == 9
+
+
+def test_of_a_search_that_is_resumed_what_it_does_from_then_on_is_seen(tmp_path: Path) -> None:
+    plan, told = PROBLEM.plan(), list[WindowNews]()
+    job = Job(PROBLEM, SearchSettings(2, 1, 0.2), tmp_path / "kick.json")
+
+    def interrupt(progress: Progress, windows: int) -> None:
+        del windows
+        if progress.window == 1:
+            raise KeyboardInterrupt
+
+    def report(progress: Progress, windows: int) -> None:
+        if progress.tried:
+            told.append(window_news(plan, progress, windows))
+
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct(job, interrupt)
+    reconstruct(replace(job, resume=True), report)
+
+    assert [each.number for each in told] == [2, 3]
+    assert {len(world.positions) for world in told[0].worlds} == {WINDOW + 1}
+    assert {len(world.positions) for world in told[1].worlds} == {BEFORE + WINDOW + 1}
+    assert [len(each.best) for each in told] == [WINDOW + 1, 2 * WINDOW + 1]
