@@ -9,7 +9,7 @@ import viser
 
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
-from actuated_characters.viewer.drawing.drawn_character import GHOST
+from actuated_characters.viewer.drawing.colors import GHOST
 from actuated_characters.viewer.drawing.scene import BrowserScene
 from actuated_characters.viewer.search.news import Fate, MotionNews, WindowNews, as_cost
 
