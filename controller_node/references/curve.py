@@ -14,7 +14,7 @@ from msgs_config.geometry import fixed_order, rotations
 # the columns are its end, its first derivatives at 0 and at 1, and its second ones.
 _LINEAR = np.array([[1.0]])
 _CUBIC = np.array([[0.0, 1.0, 0.0], [3.0, -2.0, -1.0], [-2.0, 1.0, 1.0]])
-_QUINTIC = np.array(
+QUINTIC = np.array(
     [
         [0.0, 1.0, 0.0, 0.0, 0.0],
         [0.0, 0.0, 0.0, 0.5, 0.0],
@@ -23,7 +23,7 @@ _QUINTIC = np.array(
         [6.0, -3.0, -3.0, -0.5, 0.5],
     ]
 )
-_DEGREE = len(_QUINTIC)
+_DEGREE = len(QUINTIC)
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,20 @@ class Curve:
             turned, velocity[entries], acceleration[entries]
         )
         return ReferenceState(GeneralizedPosition(position, orientations), velocity, acceleration)
+
+    def configurations(self, times: FloatArray) -> GeneralizedPosition:
+        """The configurations (m, n), (m, k, 4) at times (m,) in s, as `sample` has them."""
+        begins, ends = np.array(self._knot_times[:-1]), np.array(self._knot_times[1:])
+        segments = np.searchsorted(begins, times, side="right").clip(1, len(begins)) - 1
+        u = ((times - begins[segments]) / (ends - begins)[segments]).clip(0.0, 1.0)
+        powers = fixed_order.powers(u, _DEGREE + 1)[:, 1:, np.newaxis]
+        moved = fixed_order.total(powers * self._coefficients[segments], axis=1)
+        entries = self._layout.rotation_entries
+        turned = rotations.exp(moved[:, entries])
+        orientations = rotations.multiply(self._orientations[segments], turned)
+        positions = self._positions[segments] + moved
+        positions[:, entries] = rotations.log(orientations)
+        return GeneralizedPosition(positions, orientations)
 
     def coordinate(self, entry: int, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Times in s and values of a hinge or slider at shares (m,) of each segment, (p - 1, m)."""
@@ -200,7 +214,7 @@ def _coefficients(layout: JointLayout, knots: Knots) -> FloatArray:
         if accelerations is not None:
             squares = durations * durations
             conditions += [squares * accelerations[:-1], squares * second_rates]
-            table = _QUINTIC
+            table = QUINTIC
     coefficients = np.zeros((len(ends), _DEGREE, layout.size))
     coefficients[:, : len(table)] = fixed_order.product(table, np.stack(conditions, axis=1))
     return coefficients

@@ -1,0 +1,125 @@
+"""Keys as a file has them: rounded, and with the path that their rotations really take."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuated_characters.keys.goal import Goal, Keys, Loop, path_of
+from actuated_characters.keys.relaxing import relax
+from actuated_characters.keys.samples import Samples, moved, spatial_difference
+from controller_node.references.files.keyframes import Keyframes
+from controller_node.references.keyframes import curve_through
+from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import JointLayout
+
+SHORTEST_GAP = 1e-3  # s, the unit of written times
+_DIGITS, _DIGITS_OF_END = 4, 6  # of values, rad and m, and of the time of the end, s
+_AIM = 0.95  # tolerances, where the path is corrected; the rest is for rounding
+_CORRECTIONS, _MAX_ADDED = 3, 30  # of the path before a key is added, and how many are
+_SWEPT, _SWEEP_STEP = 10, 5  # keys that are corrected at once, and by how many the next ones begin
+
+
+@dataclass(frozen=True)
+class FewestKeys:
+    """Keys, and how far their path is from the motion."""
+
+    keyframes: Keyframes
+    deviations: FloatArray  # (m, b) at each sample, of each physical vector, rad or m
+    tolerances: FloatArray  # (b,) rad or m
+
+    @property
+    def error(self) -> float:
+        """The largest deviation, in tolerances."""
+        return float((self.deviations / self.tolerances).max())
+
+
+@dataclass(frozen=True)
+class WrittenPath:
+    """How keys become keyframes, and what their path lacks of the motion."""
+
+    layout: JointLayout
+    samples: Samples
+    coordinates: FloatArray  # (m, n) of the samples, unrolled, in tolerances
+    scale: FloatArray  # (n,) rad or m, the tolerance of each entry
+    bounds: tuple[FloatArray, FloatArray]  # (n,) each, rad and m
+
+    def keyframes(self, keys: Keys, loop: Loop | None) -> Keyframes:
+        """The keyframes, with values that a file has with a few digits."""
+        times = keys.times
+        here = np.stack(
+            [np.interp(times, self.samples.times, column) for column in self.coordinates.T], axis=1
+        )
+        way = (keys.values - here) * self.scale
+        positions = moved(self.layout, self.samples.at(self.layout, times), way).position
+        grid = 10.0**_DIGITS
+        lower, upper = np.ceil(self.bounds[0] * grid) / grid, np.floor(self.bounds[1] * grid) / grid
+        positions = np.clip(np.round(positions, _DIGITS), lower, upper) + 0.0  # no negative zero
+        period = None if loop is None else round(loop.period, _DIGITS_OF_END)
+        return Keyframes(times, self.layout.configuration(positions), True, period)
+
+    def left(self, keyframes: Keyframes) -> FloatArray:
+        """What the path lacks (m, n) at each sample, in tolerances."""
+        path = curve_through(self.layout, keyframes).configurations(self.samples.times)
+        difference = spatial_difference(self.layout, path, self.samples.configurations)
+        lacking: FloatArray = difference / self.scale
+        return lacking
+
+    def corrected(self, goal: Goal, keys: Keys) -> FewestKeys:
+        """The keyframes of keys, led back to within the tolerances.
+
+        So far the path was that of plain numbers, which differs a little where rotations turn about
+        several axes. What its true path lacks is added to the goal, and the values are fitted anew;
+        where this is not enough there is a key more.
+        """
+        keys = replace(keys, times=_rounded(keys.times, goal.loop))
+        best: FewestKeys | None = None
+        for attempt in range(_CORRECTIONS * (_MAX_ADDED + 1)):
+            keyframes = self.keyframes(keys, goal.loop)
+            left = self.left(keyframes)
+            lengths = goal.lengths(left)
+            found = self._found(keyframes, lengths)
+            if best is None or found.error < best.error:
+                best = found
+            if best.error <= 1.0:
+                break
+            path = path_of(goal, keys, self.samples.times)
+            true_goal = replace(goal, times=self.samples.times, values=path + left)
+            if goal.loop is not None:
+                true_goal = true_goal.looped(goal.loop)
+            if attempt % _CORRECTIONS == _CORRECTIONS - 1:
+                keys = _with_one_more(true_goal, keys, lengths.max(axis=1))
+            keys = _refitted(true_goal, keys)
+        assert best is not None
+        return best
+
+    def _found(self, keyframes: Keyframes, lengths: FloatArray) -> FewestKeys:
+        tolerances = self.scale[self.layout.vector_starts]
+        return FewestKeys(keyframes, lengths * tolerances, tolerances)
+
+
+def _rounded(times: FloatArray, loop: Loop | None) -> FloatArray:
+    """Times of keys in whole ms; the end of what is no loop stays where it is."""
+    rounded = np.round(times / SHORTEST_GAP) * SHORTEST_GAP
+    if loop is None:
+        rounded[-1] = round(float(times[-1]), _DIGITS_OF_END)
+    return rounded
+
+
+def _refitted(goal: Goal, keys: Keys) -> Keys:
+    """The keys with values that are nearer to the goal, wherever the path is far from it."""
+    for first in range(0, len(keys.times), _SWEEP_STEP):
+        chosen = (first, first + _SWEPT - 1)
+        _, keys = relax(goal, keys, chosen, moves=False, aim=_AIM)
+    return keys
+
+
+def _with_one_more(goal: Goal, keys: Keys, errors: FloatArray) -> Keys:
+    """The keys with one more, in the middle of the two about the sample that is farthest off."""
+    ends = keys.times if goal.loop is None else np.append(keys.times, goal.loop.period)
+    worst = goal.times[len(goal.times) // 3 if goal.loop else 0 :][int(errors.argmax())]
+    segment = int(np.searchsorted(ends, worst, side="right").clip(1, len(ends) - 1)) - 1
+    time = float(np.round(0.5 * (ends[segment] + ends[segment + 1]), 3))
+    if min(time - ends[segment], ends[segment + 1] - time) < SHORTEST_GAP:
+        return keys
+    values = np.array([np.interp(time, goal.times, column) for column in goal.values.T])
+    return keys.inserted(time, values)
