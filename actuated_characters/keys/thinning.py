@@ -22,7 +22,7 @@ class Thinning:
 
     def __init__(self, goal: Goal, keys: Keys, progress: Progress) -> None:
         self.keys = keys
-        self._goal, self._progress = goal, progress
+        self._goal, self._report, self._done = goal, progress, 0.0
         self._costs = np.zeros(0)  # (p,) largest error without a key, in tolerances
         self._tried = np.zeros(0, dtype=np.bool_)  # (p,) whether moving times did not help
         self._begin = len(keys.times)
@@ -37,6 +37,11 @@ class Thinning:
             self._assess()
         self._take_away_moving()
         return self.keys
+
+    def _progress(self, share: float) -> None:
+        """Report the share that is done, which never falls."""
+        self._done = max(self._done, share)
+        self._report(self._done)
 
     def _assess(self) -> None:
         count = len(self.keys.times)
