@@ -7,7 +7,7 @@ import numpy as np
 from actuated_characters.keys.goal import Goal, Keys
 from actuated_characters.keys.relaxing import relax
 
-_NEAR, _NEAR_MOVING = 3, 5  # keys on each side that make up for one, without and with their times
+_NEAR, _NEAR_MOVING = 3, 4  # keys on each side that make up for one, without and with their times
 _AFFECTED = 5  # keys on each side of one that is gone, whose own cost is another one then
 _HOPELESS = 6.0  # tolerances, beyond which moving the neighbours' times is not tried
 _SWEEPS, _SWEPT, _SWEEP_STEP, _SWEEP_AIM = 2, 8, 4, 0.3

@@ -32,7 +32,7 @@ def test_each_vector_has_the_tolerance_of_its_unit() -> None:
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 def test_a_tolerance_is_positive(value: float) -> None:
-    with pytest.raises(ConfigurationError, match="--angle is .*; it must be more than 0"):
+    with pytest.raises(ConfigurationError, match=r"--angle is .*; it must be more than 0"):
         Tolerances(angle=value)
 
 
