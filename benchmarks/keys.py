@@ -22,7 +22,7 @@ def main() -> int:
             str(len(keyed.clip.times)),
             f"{keyed.clip.rate:.0f}",
             str(len(keyed.found.keyframes.times)),
-            f"{100 * keyed.share:.0f} %",
+            f"{100 * keyed.share:.3g} %",
             "-" if angle is None else f"{angle.size:.3f} ({angle.joint})",
             "-" if place is None else f"{1e3 * place.size:.1f}",
         )

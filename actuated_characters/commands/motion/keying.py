@@ -43,7 +43,7 @@ def add_motion_keys(commands: "Commands[argparse.ArgumentParser]") -> None:
         "each frame and halfway between frames. Times and poses are free, so a pose need not be a "
         "frame's. Edit the file, and play it with `run --keyframes FILE`; of a folder, all clips "
         "in it.",
-        ["motion keys walk --output walk.yaml", "motion keys clips --output keys --angle 0.1"],
+        ["motion keys jump --output jump.yaml", "motion keys clips --output keys --angle 0.1"],
     )
     command.add_argument(
         "source", metavar="CLIP", help="a clip's name or file, or a folder of them"
@@ -121,7 +121,7 @@ def _made(
 def _facts(keyed: "KeyedClip") -> Iterator[tuple[str, str]]:
     clip, keyframes = keyed.clip, keyed.found.keyframes
     yield "frames", f"{len(clip.times)}, {clip.rate:.4g} a second, {clip.duration:.3g} s"
-    yield "keys", f"{len(keyframes.times)}, {100 * keyed.share:.0f} % of the frames"
+    yield "keys", f"{len(keyframes.times)}, {100 * keyed.share:.3g} % of the frames"
     yield "worst angle", _described(keyed.angle, 1.0, "rad")
     yield "worst place", _described(keyed.place, 1e3, "mm")
     if keyframes.period is not None:
@@ -170,7 +170,7 @@ def _print_table(made: "list[tuple[Conversion, KeyedClip]]") -> None:
             str(conversion.output),
             str(len(keyed.clip.times)),
             str(len(keyed.found.keyframes.times)),
-            f"{100 * keyed.share:.0f}",
+            f"{100 * keyed.share:.3g}",
             _described(keyed.angle, 1.0, "rad"),
             _described(keyed.place, 1e3, "mm"),
         )
