@@ -15,7 +15,7 @@ from msgs_config.character.layout import JointLayout
 SHORTEST_GAP = 1e-3  # s, the unit of written times
 _DIGITS, _DIGITS_OF_END = 4, 6  # of values, rad and m, and of the time of the end, s
 _AIM = 0.95  # tolerances, where the path is corrected; the rest is for rounding
-_CORRECTIONS, _MAX_ADDED = 3, 30  # of the path before a key is added, and how many are
+_CORRECTIONS, _MAX_ADDED = 4, 30  # of the path before a key is added, and how many are
 _SWEPT, _SWEEP_STEP = 10, 5  # keys that are corrected at once, and by how many the next ones begin
 
 
@@ -82,12 +82,13 @@ class WrittenPath:
                 best = found
             if best.error <= 1.0:
                 break
+            if attempt % _CORRECTIONS == _CORRECTIONS - 1:
+                keys = _with_one_more(goal, keys, lengths.max(axis=1))
+                continue
             path = path_of(goal, keys, self.samples.times)
             true_goal = replace(goal, times=self.samples.times, values=path + left)
             if goal.loop is not None:
                 true_goal = true_goal.looped(goal.loop)
-            if attempt % _CORRECTIONS == _CORRECTIONS - 1:
-                keys = _with_one_more(true_goal, keys, lengths.max(axis=1))
             keys = _refitted(true_goal, keys)
         assert best is not None
         return best
