@@ -1,7 +1,10 @@
-"""The text of a keyframes file, as `controller_node.references.files.keyframes` reads it."""
+"""Keys as the text of a file: of keyframes (`controller_node.references.files.keyframes`), or of a
+timeline (`controller_node.references.timeline`).
+"""
 
 import json
 import re
+from collections.abc import Sequence
 
 import numpy as np
 import yaml
@@ -24,16 +27,34 @@ def keyframes_text(layout: JointLayout, keyframes: Keyframes, remark: str) -> st
         keyframes: Times in s, values in rad and m.
         remark: Comment at the top, of one line or several.
     """
-    lines = [f"# {line}" for line in remark.splitlines()]
-    lines.append(f"interpolation: {'smooth' if keyframes.smooth else 'linear'}")
+    head = [f"interpolation: {'smooth' if keyframes.smooth else 'linear'}"]
     if keyframes.period is not None:
-        lines += ["loop: true", f"period: {_number(keyframes.period, 6)}"]
-    lines.append("keyframes:")
+        head += ["loop: true", f"period: {_number(keyframes.period, 6)}"]
+    return _text(layout, keyframes, remark, [*head, "keyframes:"], "  - time")
+
+
+def timeline_text(layout: JointLayout, keyframes: Keyframes, remark: str, character: str) -> str:
+    """The YAML text of a timeline with one layer of these poses; else as `keyframes_text`.
+
+    `character` is its name, or the path of its file.
+    """
+    duration = _number(float(keyframes.times[-1]), 6)
+    head = [f"character: {json.dumps(character)}", f"duration: {duration}"]
+    head += ["keys:", "  - out: never", "    poses:"]
+    return _text(layout, keyframes, remark, head, "      - at")
+
+
+def _text(
+    layout: JointLayout, keyframes: Keyframes, remark: str, head: Sequence[str], item: str
+) -> str:
+    """The text of a remark, the lines of a head, and a list of poses, each after an item's time."""
+    lines = [*(f"# {line}" for line in remark.splitlines()), *head]
+    indent = " " * (len(item) - len(item.lstrip(" -")))
     before: FloatArray | None = None
     for time, pose in zip(keyframes.times, keyframes.configurations.position, strict=True):
-        lines.append(f"  - time: {_number(float(time), 6)}")
+        lines.append(f"{item}: {_number(float(time), 6)}")
         joints = _joints(layout, pose, before)
-        lines.append("    pose: {" + ",\n           ".join(joints) + "}")
+        lines.append(f"{indent}pose: {{" + f",\n{indent}       ".join(joints) + "}")
         before = pose
     return "\n".join(lines) + "\n"
 

@@ -69,6 +69,11 @@ def add_motion_keys(commands: "Commands[argparse.ArgumentParser]") -> None:
         metavar="M",
         help="the most by which the root's place may be off, m (%(default)s)",
     )
+    command.add_argument(
+        "--timeline",
+        action="store_true",
+        help="write timelines, for `take` and `author`, not keyframes",
+    )
     command.add_argument("--overwrite", action="store_true", help="replace files")
 
 
@@ -100,7 +105,7 @@ def _made(
     tolerances: "Tolerances",
 ) -> "KeyedClip":
     """The keys of a clip, written."""
-    from actuated_characters.keys.keyframes_file import keyframes_text
+    from actuated_characters.keys.keyframes_file import keyframes_text, timeline_text
     from actuated_characters.keys.of_clip import keys_of_clip
     from character_motion.clips.motion_clip import read_motion_clip
     from msgs_config.whole_files import write_whole
@@ -113,7 +118,11 @@ def _made(
     facts = [f"{name}: {value}" for name, value in _facts(keyed)]
     remark = "\n".join([f"Keys of the clip {conversion.source}", *facts])
     make_folder_of(conversion.output)
-    text = keyframes_text(character.layout, keyed.found.keyframes, remark)
+    keyframes = keyed.found.keyframes
+    if options.timeline:
+        text = timeline_text(character.layout, keyframes, remark, options.character)
+    else:
+        text = keyframes_text(character.layout, keyframes, remark)
     write_whole(conversion.output, text)
     return keyed
 
@@ -156,9 +165,11 @@ def _report(options: argparse.Namespace, conversion: Conversion, keyed: "KeyedCl
     console.print(make_facts_table(str(conversion.output), _facts(keyed)))
     for remark in _remarks(keyed):
         console.print("remark:", remark, soft_wrap=True, markup=False, highlight=False)
-    words = f"actuated_characters run --keyframes {shlex.quote(str(conversion.output))}"
-    words += f" --duration {keyed.clip.duration:.3f}"
-    if options.character != CHARACTER:
+    file = shlex.quote(str(conversion.output))
+    words = f"actuated_characters take {file}"
+    if not options.timeline:
+        words = f"actuated_characters run --keyframes {file} --duration {keyed.clip.duration:.3f}"
+    if options.character != CHARACTER and not options.timeline:
         words += f" --character {shlex.quote(options.character)}"
     console.print("play it:", words, soft_wrap=True, markup=False)
 

@@ -223,7 +223,10 @@ def _later(reader: MappingReader, key: str, begin: float, than: str = "at") -> f
 
 
 def _blend(reader: MappingReader, key: str) -> float:
-    return reader.number(key, _BLEND, 0.0, LARGEST_NUMBER)
+    blend = reader.number(key, _BLEND, 0.0, LARGEST_NUMBER)
+    if 0.0 < blend < _SHORTEST:
+        raise reader.wrong(key, blend, f"0, or {_SHORTEST:g} s or more")
+    return blend
 
 
 def _vector(reader: MappingReader, key: str) -> Point:

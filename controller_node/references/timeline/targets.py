@@ -83,8 +83,8 @@ class TargetLayers:
         count = max(round((entry.until - entry.at) * _KNOTS_PER_SECOND), 1)
         times = np.linspace(entry.at, entry.until, count + 1)
         step = times[1] - times[0]
-        times = np.concatenate(([max(entry.at - step, 0.0)], times, [entry.until + step]))
-        times = times[1:] if entry.at <= 0.0 else times
+        before_it = [entry.at - step] if entry.at > step else []
+        times = np.concatenate((before_it, times, [entry.until + step]))
         before, poses, missed = None, list[GeneralizedPosition](), 0.0
         for time in times.tolist():
             pose = beneath.sample(time).configuration

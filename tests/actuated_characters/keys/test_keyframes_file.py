@@ -5,9 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuated_characters.keys.keyframes_file import keyframes_text
+from actuated_characters.keys.keyframes_file import keyframes_text, timeline_text
+from controller_node import parameters as for_controller
 from controller_node.references.files.keyframes import Keyframes, read_keyframes
+from controller_node.references.keyframes import KeyframesReference
+from controller_node.references.timeline.file import read_timeline
+from controller_node.references.timeline.motion import timeline_motion
 from msgs_config.character.layout import JointLayout, JointType
+from tests.support.motion import assert_same_motion, random_knots
 from tests.support.physics import character
 
 
@@ -31,6 +36,25 @@ def test_what_is_written_is_read(tmp_path: Path, period: float | None) -> None:
     read = read_keyframes(humanoid, str(file))
     assert read.times.tolist() == [0.0, 0.125, 1.2] and read.smooth and read.period == period
     assert read.configurations.position == pytest.approx(position, abs=1e-12)
+
+
+def test_as_a_timeline_they_move_as_keyframes_do(tmp_path: Path) -> None:
+    humanoid = character("humanoid")
+    layout = humanoid.layout
+    knots = random_knots(humanoid, np.array([0.0, 0.5, 0.75, 1.25]))
+    rounded = layout.configuration(np.round(knots.configurations.position, 4))
+    keyframes = Keyframes(knots.times, rounded, smooth=True)
+    file = tmp_path / "keys.yaml"
+
+    file.write_text(timeline_text(layout, keyframes, "a clip", "humanoid"))
+
+    values = for_controller.resolve_for(
+        humanoid, {"character": "humanoid", "reference": "timeline", "timeline": str(file)}
+    )
+    timeline = timeline_motion(humanoid, values, read_timeline(str(file))).reference
+    alone = KeyframesReference(layout, keyframes)
+    for time in np.linspace(0.0, 1.5, 31).tolist():
+        assert_same_motion(layout, timeline.sample(time), alone.sample(time), atol=1e-9)
 
 
 def test_small_numbers_have_no_exponent_and_odd_names_are_quoted() -> None:
