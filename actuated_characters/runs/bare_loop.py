@@ -6,10 +6,12 @@ import numpy as np
 
 from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush, push_schedule
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller
+from controller_node.strength import strengths_of
 from msgs_config.messages.clock import TickClock
 from sim_node.physics.balls.throws import ThrowQueue
 from sim_node.physics.simulation import Simulation
@@ -25,8 +27,9 @@ def ticks_in_process(
     throws: Sequence[PlannedThrow] = (),
     controller: Controller | None = None,
     watch: Watch | None = None,
+    strengths: Sequence[PlannedStrengths] = (),
 ) -> Iterator[Tick]:
-    """The ticks of a plan, one by one, with pushes and throws.
+    """The ticks of a plan, one by one, with pushes, throws and strengths.
 
     The states are those of a run over topics, bit for bit. To look at the controller as well, give
     a fresh one of the plan; to look at the simulation, a `watch`.
@@ -44,6 +47,10 @@ def ticks_in_process(
         simulation.watches_contacts = controller.needs_contacts
         (character,) = simulation.characters
         episode_ns = character.state.stamp_ns
+        for each in strengths:
+            names, values = tuple(each.strengths), tuple(each.strengths.values())
+            taken = strengths_of(controller.layout, names, values, each.stamp_ns)
+            controller.set_strengths(taken, episode_ns=episode_ns)
         drives_all = character.commanded.all()
         for _ in range(plan.ticks):
             state = character.state

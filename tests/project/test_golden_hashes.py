@@ -12,6 +12,7 @@ QUICK = {"kuka_hold", "pendulum", "walk_reconstructed"}
 NIGHTLY = {  # the others hold the same code
     *("planned_reactive_hit", "planned_active_ragdoll_hit", "planned_steered", "planned_backflip"),
     *("planned_walk", "planned_reactive_hit_short", "planned_backflip_short", "run_machine"),
+    "planned_timeline",
     *("kick", "spin", "spinkick", "dance_a", "dance_b", "roll", "crawl", "punch", "getup_faceup"),
 }
 OVER_TOPICS = [

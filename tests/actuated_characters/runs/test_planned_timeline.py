@@ -12,9 +12,13 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.commands.common.planned_run import PlannedRun, planned_run
 from actuated_characters.commands.run import add_run
 from actuated_characters.replay.replay import replay
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.strengths import read_strengths
+from actuated_characters.runs.planned.timeline import plan_timeline
 from controller_node.planner.settings import PlannerParameters
+from controller_node.references.posture import Posture
+from controller_node.references.timeline.file import shipped_timelines
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages.clock import TickClock
 from tests.support.runs import run_plan, run_plan_here, summary_of
@@ -56,6 +60,11 @@ def test_over_topics_in_one_process_and_from_its_bag_a_run_has_one_hash(tmp_path
 
     assert summary_of(alone)["state_hash"] == summary_of(sent)["state_hash"]
     assert replay([read_recording(sent)]).identical
+    *_, last = ticks_in_process(
+        run.plan, run.inputs.pushes, run.inputs.throws, strengths=run.inputs.strengths
+    )
+    ends = read_recording(sent).position[-1]
+    np.testing.assert_array_equal(last.following.position, ends)
     recording = read_recording(alone)
     pushed = [row for row, push in enumerate(recording.applied_wrench) if push and push.links]
     assert pushed == list(range(120, 168))  # 0.2 s, though a push is held for 0.1 s
@@ -132,6 +141,42 @@ def test_what_is_limp_has_no_effort_until_it_is_over(tmp_path: Path) -> None:
     effort = read_recording(tmp_path / "run").effort[:, 6:]
     moved = np.abs(effort).max(axis=1) > 0.0
     assert moved[:60].all() and not moved[60:180].any() and moved[180:].all()
+
+
+# The timelines that come with the package
+
+
+@pytest.mark.parametrize("name", shipped_timelines())
+def test_a_shipped_timeline_can_be_run_as_it_is(name: str) -> None:
+    run = plan_timeline(name, {}, {})
+
+    assert run.warnings == []
+    assert PlannerParameters.of(run.plan.controller).planner == "predictive"
+    assert run.reference.end <= run.plan.ticks / RATE
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", shipped_timelines())
+def test_a_shipped_timeline_comes_to_its_end_by_joint_torques_alone(name: str, seed: int) -> None:
+    run = plan_timeline(name, {}, {"plan.seed": seed})
+    layout = run.plan.character.layout
+
+    ticks = list(
+        ticks_in_process(
+            run.plan,
+            run.inputs.pushes,
+            run.inputs.throws,
+            strengths=run.inputs.strengths,
+        )
+    )
+
+    effort = np.array([tick.following.effort for tick in ticks])
+    assert not effort[:, :6].any()
+    last = layout.configuration(ticks[-1].following.position)
+    wanted = run.reference.sample(len(ticks) / RATE).configuration
+    assert not Posture(run.plan.character).has_fallen(last, wanted)
+    assert last.position[2] > 0.7
 
 
 @pytest.mark.parametrize(
