@@ -31,7 +31,7 @@ def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
     result = clip.motion.orientations_xyzw.copy()
     index = {int(start): k for k, start in enumerate(layout.rotation_entries[:, 0])}
     for joint in layout.joints:
-        other = layout.joint(_counterpart(character, joint.name))
+        other = layout.joint(counterpart(character, joint.name))
         row, image = rows[joint.name], rows[other.name]
         if joint.type is not other.type or not _is_image(origins[row], origins[image]):
             raise _unequal(character, joint.name)
@@ -79,7 +79,7 @@ def _is_image(point: FloatArray, other: FloatArray) -> bool:
     return bool(np.abs(point * np.array((1.0, -1.0, 1.0)) - other).max() < _MAX_MIRROR_ERROR)
 
 
-def _counterpart(character: Character, name: str) -> str:
+def counterpart(character: Character, name: str) -> str:
     """The name of a joint on the other side; its own where it has no side."""
     names = character.layout.joint_names
     for one, two in _WORDS:

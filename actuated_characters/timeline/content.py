@@ -1,0 +1,108 @@
+"""The content of a timeline's file as plain values, and the text that stands for it.
+
+What is checked here is its form alone: that there are keys and events where an editor looks for
+them. Names, units and ranges are the concern of who plays it.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias, TypeGuard
+
+import yaml
+
+from msgs_config import files
+from msgs_config.errors import MotionError, one_of
+
+Content: TypeAlias = Mapping[str, Any]
+"""A whole timeline; nobody changes one, an edit makes another."""
+
+KEYS = "keys"
+TRACKS = ("clips", "steering", "reach", "look", "limp", "strengths", "pushes", "throws")
+"""The lists of events."""
+TOP_LEVEL = ("character", "duration", "run", KEYS, *TRACKS)
+
+_LINE_WIDTH = 110  # characters
+
+
+def parse(place: Path, text: str) -> dict[str, Any]:
+    """The content of a file's text; empty text is an empty timeline.
+
+    Raises:
+        MotionError: it is no YAML, or not of a timeline's form; says where.
+    """
+    content = files.parse_yaml_mapping(place, text, MotionError) if text.strip() else {}
+    for name in content:
+        if name not in TOP_LEVEL:
+            raise MotionError(f"{place}: {one_of('key', name, list(TOP_LEVEL))}")
+    for name in (KEYS, *TRACKS):
+        if content.get(name) is None:
+            content.pop(name, None)
+        _check_list(f"{place}: {name}", content.get(name, []))
+    for number, layer in enumerate(content.get(KEYS, []), 1):
+        where = f"{place}: keys {number}: poses"
+        _check_list(where, layer.get("poses"))
+        for pose_number, pose in enumerate(layer["poses"], 1):
+            _check_time(f"{where} {pose_number}", pose)
+            _check_mapping(f"{where} {pose_number}: pose", pose.get("pose"))
+    for track in TRACKS:
+        for number, event in enumerate(content.get(track, []), 1):
+            _check_time(f"{place}: {track} {number}", event)
+    return content
+
+
+def _check_list(place: str, value: object) -> None:
+    if not isinstance(value, list):
+        raise MotionError(f"{place} must be a list")
+    for number, each in enumerate(value, 1):
+        _check_mapping(f"{place} {number}", each)
+
+
+def _check_mapping(place: str, value: object) -> None:
+    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
+        raise MotionError(f"{place} must be a mapping")
+
+
+def _check_time(place: str, item: Mapping[str, Any]) -> None:
+    if not is_number(item.get("at")):
+        raise MotionError(f"{place}: at must be a time in s, a number")
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a value is a finite number, and not true or false."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) < float("inf")
+
+
+def dump(content: Content) -> str:
+    """The text of a content: its keys in the order of a hand-written file, without comments."""
+    ordered = {name: content[name] for name in TOP_LEVEL if name in content}
+    return yaml.dump(
+        ordered,
+        Dumper=_Dumper,
+        sort_keys=False,
+        default_flow_style=None,
+        width=_LINE_WIDTH,
+        allow_unicode=True,
+    )
+
+
+class _Dumper(yaml.SafeDumper):
+    """Plain data, every number so that YAML 1.2 reads it, and nothing by reference."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """Write what stands in two places twice."""
+        del data
+        return True
+
+
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    """A text, in quotes where a reader of decimal numbers would take it for one."""
+    try:
+        is_plain = files.parse_yaml("text", text, MotionError) == text
+    except MotionError:
+        is_plain = False
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if is_plain else "'")
+
+
+_Dumper.add_representer(str, _represent_text)
