@@ -1,6 +1,6 @@
 """The panel of a recorded run: the time line, what is shown, exports and forks."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, Protocol
 
@@ -12,10 +12,9 @@ from actuated_characters.viewer.drawing.scene import BrowserScene
 from actuated_characters.viewer.parameters import SHOWN
 from actuated_characters.viewer.recorded.fork_controls import CANCEL, ForkControls, ForkTarget
 from actuated_characters.viewer.recorded.ghosts import NO_GHOST, REFERENCE
+from actuated_characters.viewer.recorded.playback_controls import PlaybackControls, on
 from actuated_characters.viewer.recorded.timeline import Playback
 
-_SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-_PLAY, _PAUSE, _BACK, _NEXT, _START, _END = "Play", "Pause", "-1", "+1", "Start", "End"
 _PNG, _MP4 = "PNG", "MP4"
 _OF_SCENE = {name: label for name, label in SHOWN.items() if name != "reference"}
 
@@ -54,7 +53,7 @@ class RecordedPanel:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("")
-        self._add_time()
+        self.time = PlaybackControls(gui, timeline, actions)
         self.ghost: Any = gui.add_dropdown("Ghost", (REFERENCE, NO_GHOST))
         self.forks = ForkControls(gui, actions, shown, self._cancel)
         self.character: Any = gui.add_dropdown("Plots of", ("",), visible=False)
@@ -64,53 +63,13 @@ class RecordedPanel:
         self._add_export()
         self.forks.add_folder(by_arrow=by_arrow)
 
-    def _on(self, handle: Any, act: Callable[[Any], None], *, click: bool = False) -> None:
-        """Have the player's thread call a function with a control's value when a client sets it."""
-
-        async def change(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # an event without a client is this panel's own
-                self._actions.put(partial(act, handle.value))
-
-        (handle.on_click if click else handle.on_update)(change)
-
-    def _add_time(self) -> None:
-        gui, timeline = self._gui, self._timeline
-        first = float(timeline.times[0])
-        end = max(timeline.end, first + 1e-3)
-        self.slider: Any = gui.add_slider("Time (s)", first, end, 1e-3, initial_value=first)
-        self._on(self.slider, self._seek)
-        moves = (_PLAY, _PAUSE, _BACK, _NEXT, _START, _END)
-        self.playback: Any = gui.add_button_group("Playback", moves)
-        self._on(self.playback, self._move, click=True)
-        speed: Any = gui.add_dropdown("Speed", _SPEEDS, initial_value="1")
-        self._on(speed, lambda label: setattr(timeline, "speed", float(label)))
-        loop: Any = gui.add_checkbox("Loop", initial_value=False)
-        self._on(loop, partial(setattr, timeline, "loops"))
-
-    def _seek(self, time: float) -> None:
-        self._timeline.plays = False
-        self._timeline.seek(time)
-
-    def _move(self, button: str) -> None:
-        timeline = self._timeline
-        if button == _PLAY:
-            timeline.play()
-        elif button == _PAUSE:
-            timeline.plays = False
-        elif button == _START:
-            self._seek(float(timeline.times[0]))
-        elif button == _END:
-            self._seek(timeline.end)
-        else:
-            timeline.step(-1 if button == _BACK else 1)
-
     def _add_shown(self) -> None:
         with self._gui.add_folder("Show", expand_by_default=False):
             for name, label in _OF_SCENE.items():
                 box: Any = self._gui.add_checkbox(label, initial_value=True)
-                self._on(box, partial(self.shows.__setitem__, name))
+                on(self._actions, box, partial(self.shows.__setitem__, name))
             follows: Any = self._gui.add_checkbox("Follow", initial_value=True)
-            self._on(follows, partial(setattr, self._scene, "follows"))
+            on(self._actions, follows, partial(setattr, self._scene, "follows"))
 
     def _add_export(self) -> None:
         gui, timeline = self._gui, self._timeline
@@ -151,7 +110,7 @@ class RecordedPanel:
         )
         if self._state.content != text:
             self._state.content = text
-            self.slider.value = round(timeline.time, 3)
+            self.time.show_time()
 
     def tell(self, sentence: str) -> None:
         """Show a sentence as it is; none if it is empty."""

@@ -10,10 +10,7 @@ from actuated_characters.bags.robots.reading import RobotSource
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.recorded.player import RecordedPlayer
 from actuated_characters.viewer.recorded.run import check_comparable, read_run
-from actuated_characters.viewer.web.rejections import Rejections
-from actuated_characters.viewer.web.request_check import RequestCheck
-from actuated_characters.viewer.web.server import describe_address, open_socket, start_server
-from actuated_characters.viewer.web.server import stop_server as stop
+from actuated_characters.viewer.web.server import serving
 
 
 def show_recorded(
@@ -42,13 +39,8 @@ def show_recorded(
     told([each for shown in (run, *beside) for each in shown.recordings])
     for other in beside:
         check_comparable(run, other)
-    rejections = Rejections()
-    listening = open_socket(host, port)
-    server = start_server(listening, RequestCheck(host), rejections.note)
-    try:
+    with serving(host, port) as (server, rejections, address):
         player = RecordedPlayer(server, run, beside, skin)
-        for line in describe_address(host, listening.getsockname()[1]):
+        for line in address:
             print(line, flush=True)
         player.play(fps, rejections)
-    finally:
-        stop(server)

@@ -65,7 +65,7 @@ class RecordedPlayer:
         self._drawn = self._add_characters(skin)
         self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
         self._panel = self._add_panel()
-        self._bar = TimeBar(server, self._timeline, self._panel.slider, self._panel.playback)
+        self._bar = TimeBar(server, self._timeline, self._panel.time)
         self._marks = find_marks(run)
         self._plots, self._curves = Plots(server.gui), run_curves(run, run.name)
         self._panel.character.options = tuple(self._curves)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from actuated_characters.viewer.recorded.marks import Mark
+from actuated_characters.viewer.recorded.playback_controls import PlaybackControls
 from actuated_characters.viewer.recorded.timeline import Playback
 from actuated_characters.viewer.web.server import ViewerServer
 
@@ -28,29 +29,32 @@ class TimeBar:
     """The time line of all pages of a server."""
 
     def __init__(
-        self, server: ViewerServer, timeline: Playback, slider: Any, playback: Any
+        self, server: ViewerServer, timeline: Playback, controls: PlaybackControls
     ) -> None:
-        """Add it; the panel's `slider` sets the time, and `playback` has its buttons."""
+        """Add it; the panel's `controls` are what it acts by."""
         self._timeline = timeline
         # no other viewer's on this port before, to which a page was connected
         self._version = secrets.randbelow(_VERSIONS)
         self._frame = server.scene.add_frame(_FRAME, show_axes=False)
         self._told: dict[str, Any] = {
             "first": float(timeline.times[0]),
-            "last": timeline.end,
-            "slider": slider._impl.uuid,
-            "playback": playback._impl.uuid,
+            "slider": controls.slider._impl.uuid,
+            "playback": controls.buttons._impl.uuid,
         }
         self._text = "{}"
         server.parts.files += _FILES
         server.parts.texts[_ADDRESS] = lambda: self._text
 
     def mark(self, marks: Sequence[Mark], ghost: str = "", of_ghost: Sequence[Mark] = ()) -> None:
-        """Show these marks, and below them those of a ghost, if it has a name."""
+        """Show these marks, and below them those of a ghost, if it has a name.
+
+        The time line is as long as it is now.
+        """
         self._version += 1
         shown = {"marks": marks, "ghostMarks": of_ghost}
         lists = {name: [asdict(mark) for mark in each] for name, each in shown.items()}
-        self._text = json.dumps({**self._told, **lists, "ghost": ghost, "version": self._version})
+        told = {**self._told, "last": self._timeline.end, "version": self._version}
+        self._text = json.dumps({**told, **lists, "ghost": ghost})
 
     def show_time(self) -> None:
         """Bring all pages to the present time.

@@ -20,6 +20,7 @@ from actuated_characters.viewer.web.connection import CheckedConnection, Reject
 from actuated_characters.viewer.web.gate import ServerGate
 from actuated_characters.viewer.web.message_check import MessageCheck
 from actuated_characters.viewer.web.page_parts import PageParts
+from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.request_check import RequestCheck, is_loopback
 from msgs_config.errors import ConfigurationError, RecordingError
 
@@ -122,6 +123,22 @@ def start_server(listening: socket.socket, check: RequestCheck, reject: Reject) 
     server._event_loop.set_exception_handler(gate.handle_error)
     gate.open(MessageCheck(server))
     return server
+
+
+@contextmanager
+def serving(host: str, port: int | None) -> Iterator[tuple[ViewerServer, Rejections, list[str]]]:
+    """A server until the end of the block, what it rejects, and the lines that say where it is.
+
+    Raises:
+        ConfigurationError: as `open_socket` and `start_server` do.
+    """
+    rejections = Rejections()
+    listening = open_socket(host, port)
+    server = start_server(listening, RequestCheck(host), rejections.note)
+    try:
+        yield server, rejections, describe_address(host, listening.getsockname()[1])
+    finally:
+        stop_server(server)
 
 
 def stop_server(server: ViewerServer) -> None:

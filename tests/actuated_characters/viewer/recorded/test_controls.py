@@ -37,7 +37,7 @@ def test_who_goes_to_a_state_stands_there_also_in_a_loop(
     timeline.loops = True
     timeline.play_from(0.5)
 
-    panel._move(button)
+    panel.time.move(button)
     timeline.advance(0.1)
 
     assert (timeline.row, timeline.plays) == (row, False)

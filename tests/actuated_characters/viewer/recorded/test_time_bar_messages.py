@@ -6,7 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.recorded.marks import Mark
+from actuated_characters.viewer.recorded.playback_controls import PlaybackControls
 from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import Playback
 from actuated_characters.viewer.web.request_check import RequestCheck
@@ -29,9 +31,7 @@ def server() -> Iterator[ViewerServer]:
 
 
 def make_bar(server: ViewerServer, timeline: Playback) -> TimeBar:
-    slider = server.gui.add_slider("Time (s)", 0.0, 3600.0, 1e-3, initial_value=0.0)
-    playback = server.gui.add_button_group("Playback", ("Play", "Pause"))
-    return TimeBar(server, timeline, slider, playback)
+    return TimeBar(server, timeline, PlaybackControls(server.gui, timeline, ActionQueue()))
 
 
 def place_of(server: ViewerServer) -> list[float]:
