@@ -10,6 +10,7 @@ from msgs_config.runtime.process import EXIT_ERROR, limit_threads, open_missing_
 
 limit_threads()  # before anything imports numpy
 
+from actuated_characters.commands.author import add_author
 from actuated_characters.commands.common.completion import add_names, complete
 from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
 from actuated_characters.commands.common.overview import print_overview
@@ -65,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
         *(add_run, add_play, add_view, add_fork, add_render, add_replay, add_info, add_report),
-        *(add_compare, add_export, add_motion, add_take, add_train),
+        *(add_compare, add_export, add_motion, add_author, add_take, add_train),
     ):
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them

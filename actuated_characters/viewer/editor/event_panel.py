@@ -1,0 +1,57 @@
+"""The form of an event in the panel: other fields for each track."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import viser
+
+from actuated_characters.timeline import edits
+from actuated_characters.viewer.controls.actions import ActionQueue
+from actuated_characters.viewer.editor.event_forms import FORMS, LINK, NUMBER, Field, read_form
+from actuated_characters.viewer.editor.session import Session
+from actuated_characters.viewer.recorded.playback_controls import on
+
+_LASTS = 1.0  # s that an event lasts at first
+
+
+class EventForm:
+    """The fields of one track at a time, in the folder in which it is made."""
+
+    def __init__(
+        self, gui: viser.GuiApi, session: Session, tracks: Sequence[str], actions: ActionQueue
+    ) -> None:
+        self._gui, self._session = gui, session
+        self._track: Any = gui.add_dropdown("New", tuple(tracks), initial_value=tracks[0])
+        self._links = tuple(link.name for link in session.character.links)
+        self._handles: dict[str, dict[str, Any]] = {
+            track: {field.name: self._add(field) for field in FORMS[track]} for track in tracks
+        }
+        on(actions, self._track, self._show)
+        self._show(tracks[0])
+
+    def _add(self, field: Field) -> Any:
+        label = f"{field.name}"
+        if field.kind == NUMBER:
+            initial = _LASTS if field.default is None else float(field.default)
+            return self._gui.add_number(label, initial, step=0.01, hint=field.about)
+        if field.kind == LINK:
+            return self._gui.add_dropdown(label, self._links, hint=field.about)
+        return self._gui.add_text(label, str(field.default), hint=field.about)
+
+    def _show(self, track: str) -> None:
+        for name, handles in self._handles.items():
+            for handle in handles.values():
+                handle.visible = name == track
+        until = self._handles[track].get("until")
+        if until is not None:
+            until.value = round(self._session.time + _LASTS, 3)
+
+    def edit(self) -> edits.Edit:
+        """The edit that adds what the fields say at the present time.
+
+        Raises:
+            MotionError: a field cannot be read.
+        """
+        track = str(self._track.value)
+        given = {name: handle.value for name, handle in self._handles[track].items()}
+        return edits.add_event(track, read_form(track, self._session.time, given))

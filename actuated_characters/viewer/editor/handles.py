@@ -1,0 +1,104 @@
+"""What of a character is taken by the pointer, which of its links stand, and what may move."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller_node.references.posing import Posing, Target
+from msgs_config.arrays import BoolArray, FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.layout import GeneralizedPosition, JointType
+from msgs_config.character.lowest_points import lowest_heights
+from msgs_config.character.model import Character, Vector
+
+_STANDS_BELOW_M = 0.05  # height of a link's lowest point, from which on it does not stand
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A point of a link."""
+
+    row: int  # of the link
+    point: Vector  # m, in the link frame
+
+
+def handles_of(character: Character) -> list[Handle]:
+    """The handles of a character: its ends, its middle joints, and what carries several limbs.
+
+    Of a humanoid hands, feet and head, elbows and knees, pelvis and chest.
+    """
+    links = character.links
+    children = [[each.parent for each in links].count(row) for row in range(len(links))]
+    handles = []
+    for row, link in enumerate(links):
+        is_base, is_end = link.parent < 0, children[row] == 0
+        if is_base and link.joint.type is not JointType.FLOATING:
+            continue
+        is_limb_root = not is_base and children[link.parent] > 1 and children[row] == 1
+        if is_limb_root or (link.joint.type is JointType.FIXED and not is_end):
+            continue
+        is_body = is_base or is_end or children[row] > 1
+        handles.append(Handle(row, link.inertial_pose.position if is_body else (0.0, 0.0, 0.0)))
+    return handles
+
+
+def standing_links(character: Character, pose: GeneralizedPosition) -> tuple[str, ...]:
+    """The feet, of what has none the ends, that are at the ground in a pose."""
+    if not character.layout.has_floating_base:
+        return ()
+    model = DynamicsModel(character)
+    model.update(pose.position, np.zeros(character.layout.size))
+    heights = lowest_heights(character, model)
+    names = [link.name for link in character.links]
+    ends = character.feet or tuple(names[row] for row in character.end_effectors)
+    return tuple(name for name in ends if heights[names.index(name)] < _STANDS_BELOW_M)
+
+
+class Drag:
+    """A point of a link that follows the pointer, from the pose in which it was taken.
+
+    Links that stand stay where they are, but for the one that is dragged. Without any the base
+    stays, unless it is the one.
+    """
+
+    def __init__(
+        self,
+        posing: Posing,
+        character: Character,
+        pose: GeneralizedPosition,
+        handle: Handle,
+        *,
+        limb_alone: bool,
+        stands: Sequence[str],
+    ) -> None:
+        """`limb_alone`: nothing moves but the limb that the link is of; `stands`: links."""
+        self._posing, self._pose, self._last = posing, pose, pose
+        self._link, self._point = character.links[handle.row].name, handle.point
+        self._holds = tuple(name for name in stands if name != self._link)
+        self._free = self._find_free(character, handle, limb_alone=limb_alone)
+        self.place = posing.place(pose, self._link, handle.point)
+        """Where the point was (3,), m, world."""
+
+    def _find_free(
+        self, character: Character, handle: Handle, *, limb_alone: bool
+    ) -> BoolArray | None:
+        layout = character.layout
+        is_base = character.links[handle.row].parent < 0
+        if limb_alone and not is_base:
+            self._holds = ()
+            return self._posing.chain(self._link)
+        if not layout.has_floating_base or self._holds:
+            return None
+        root = layout.mask([layout.joints[0].name])
+        return root if is_base else ~root
+
+    def pose(self, place: FloatArray) -> GeneralizedPosition:
+        """The pose with the point at a place (3,), m, world, or as near as it can come."""
+        x, y, z = place.tolist()
+        target = Target(self._link, (x, y, z), self._point)
+        found = self._posing.fit(
+            self._pose, [target], free=self._free, holds=self._holds, start=self._last
+        )
+        self._last = found.pose
+        return found.pose

@@ -1,0 +1,58 @@
+"""What is marked on the time line of a timeline: keys, and events of the other tracks."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from actuated_characters.timeline.content import KEYS, TRACKS, Content, is_number
+from actuated_characters.viewer.editor.event_forms import describe_event
+from actuated_characters.viewer.recorded.marks import END, KEYFRAME, Mark
+
+_KINDS = {"pushes": "push", "throws": "throw"}
+_SPAN = "mode"
+_COLORS = {
+    "clips": "#1f77b4",
+    "steering": "#17becf",
+    "reach": "#2ca02c",
+    "look": "#8c6d31",
+    "limp": "#7f7f7f",
+    "strengths": "#9467bd",
+}
+
+
+def find_key_marks(content: Content, length: float) -> list[Mark]:
+    """The marks by their start; the time line is so long, s."""
+    marks = [
+        Mark(KEYFRAME, float(pose["at"]), float(pose["at"]), _describe_key(number, layer, pose))
+        for number, layer in enumerate(content.get(KEYS, []))
+        for pose in layer["poses"]
+    ]
+    spans = [track for track in TRACKS if track not in _KINDS and content.get(track)]
+    for track in TRACKS:
+        for number, event in enumerate(content.get(track, [])):
+            start, text = float(event["at"]), describe_event(track, number, event)
+            if track in _KINDS:
+                marks.append(Mark(_KINDS[track], start, start, text))
+                continue
+            lane, end = spans.index(track), _end_of(event)
+            marks.append(Mark(_SPAN, start, end, text, track, _COLORS[track], lane))
+    marks.append(Mark(END, length, length, "the end"))
+    return sorted(marks, key=lambda mark: mark.start)
+
+
+def _describe_key(number: int, layer: Mapping[str, Any], pose: Mapping[str, Any]) -> str:
+    name = layer.get("name") or f"layer {number + 1}"
+    names = list(pose["pose"])
+    what = ", ".join(names) if len(names) <= 3 else f"{len(names)} degrees of freedom"
+    ease = f", {pose['ease']}" if "ease" in pose else ""
+    return f"key of {name}: {what}{ease}"
+
+
+def _end_of(event: Mapping[str, Any]) -> float:
+    """When a span ends, s; a clip by its own times, else it is as short as can be seen."""
+    start = float(event["at"])
+    if is_number(event.get("until")):
+        return max(start, float(event["until"]))
+    if is_number(event.get("to")):
+        begin = event.get("from", 0.0)
+        return start + max(float(event["to"]) - (float(begin) if is_number(begin) else 0.0), 0.1)
+    return start + 0.1

@@ -1,0 +1,190 @@
+"""The panel of a timeline that is made: time, keys, joints, and events."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import viser
+
+from actuated_characters.timeline import edits
+from actuated_characters.timeline.content import KEYS, TRACKS
+from actuated_characters.viewer.controls.actions import ActionQueue
+from actuated_characters.viewer.controls.markup import as_text
+from actuated_characters.viewer.editor.event_forms import describe_event
+from actuated_characters.viewer.editor.event_panel import EventForm
+from actuated_characters.viewer.editor.joint_panel import JointFields
+from actuated_characters.viewer.editor.session import Session
+from actuated_characters.viewer.recorded.playback_controls import PlaybackControls, on
+from msgs_config.errors import ActuatedCharactersError
+
+_WHOLE, _LIMB = "whole body", "limb alone"
+_ALL, _MOVED = "all joints", "joints that moved"
+_NONE = "none"
+_EASES = ("smooth", "rest", "linear")
+
+
+class EditorPanel:
+    """The panel of all clients; what it does is done in the thread that runs the actions."""
+
+    def __init__(self, gui: viser.GuiApi, session: Session, actions: ActionQueue) -> None:
+        self._gui, self._session, self._actions = gui, session, actions
+        self._shown_version, self._numbers = -1, list[tuple[str, int]]()
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        gui.set_panel_label("actuated characters")
+        self._state = gui.add_markdown("")
+        self._told = gui.add_markdown("", visible=False)
+        self.time = PlaybackControls(gui, session.playback, actions)
+        self._add_keys()
+        with gui.add_folder("Dragging", expand_by_default=False):
+            self._moves: Any = gui.add_dropdown("Moves", (_WHOLE, _LIMB))
+            self._stands: Any = gui.add_checkbox("Feet stay", initial_value=True)
+        with gui.add_folder("Joint", expand_by_default=False):
+            self._joint = JointFields(gui, session, self.act, actions)
+        self._add_events()
+        self.show()
+
+    @property
+    def limb_alone(self) -> bool:
+        """Whether a drag moves the limb alone."""
+        return bool(self._moves.value == _LIMB)
+
+    @property
+    def feet_stay(self) -> bool:
+        """Whether links that stand stay during a drag."""
+        return bool(self._stands.value)
+
+    def act(self, function: Callable[[], object]) -> None:
+        """Do something, and say what was wrong with it."""
+        try:
+            function()
+        except ActuatedCharactersError as error:
+            self.tell(f"error: {error}")
+        else:
+            self.tell("")
+
+    def tell(self, sentence: str) -> None:
+        """Show a sentence as it is; none if it is empty."""
+        self._told.content = as_text(sentence)
+        self._told.visible = bool(sentence)
+
+    def _buttons(self, label: str, functions: Mapping[str, Callable[[], object]]) -> None:
+        group: Any = self._gui.add_button_group(label, tuple(functions))
+        on(self._actions, group, lambda name: self.act(functions[name]), click=True)
+
+    def _add_keys(self) -> None:
+        gui, session = self._gui, self._session
+        self._buttons(
+            "Pose",
+            {"Key": session.set_key, "Mirror": session.mirror, "Delete": session.delete_key},
+        )
+        self._buttons("Edits", {"Undo": session.undo, "Redo": session.redo})
+        with gui.add_folder("Keys"):
+            self._layer: Any = gui.add_dropdown("Layer", ("",))
+            on(self._actions, self._layer, self._choose_layer)
+            self._writes: Any = gui.add_dropdown("A key has", (_ALL, _MOVED))
+            on(
+                self._actions,
+                self._writes,
+                lambda label: setattr(session, "writes_all", label == _ALL),
+            )
+            self._buttons("Copies", {"Copy": session.copy, "Paste": session.paste})
+            go = {"Previous": partial(session.go_to_key, -1), "Next": partial(session.go_to_key, 1)}
+            self._buttons("Go to", go)
+            self._ease: Any = gui.add_dropdown("Ease", _EASES)
+            on(self._actions, self._ease, lambda ease: self.act(partial(session.set_ease, ease)))
+            self._to: Any = gui.add_number("Move to (s)", 0.0, min=0.0, step=0.01)
+            self._buttons("This key", {"Move": lambda: session.move_key(float(self._to.value))})
+            self._name: Any = gui.add_text("New layer", "")
+            self._buttons("Layers", {"Add": self._add_layer, "Remove": self._remove_layer})
+            self._length: Any = gui.add_number(
+                "Duration (s)", 0.0, min=0.0, step=0.1, hint="0: until 1 s after what is last"
+            )
+            on(self._actions, self._length, self._set_duration)
+            self._buttons("File", {"Read again": session.read_again})
+
+    def _choose_layer(self, label: str) -> None:
+        if label in self._layer.options:
+            self._session.layer = self._layer.options.index(label)
+
+    def _add_layer(self) -> None:
+        name = str(self._name.value).strip()
+        self._session.add_layer(name or f"layer {len(self._layer.options) + 1}")
+
+    def _remove_layer(self) -> None:
+        self._session.edit(edits.delete_layer(self._session.layer))
+
+    def _set_duration(self, seconds: float) -> None:
+        value = float(seconds) or None
+        self.act(lambda: self._session.edit(edits.set_value("duration", value)))
+
+    def _add_events(self) -> None:
+        gui, session = self._gui, self._session
+        with gui.add_folder("Events", expand_by_default=False):
+            self._event: Any = gui.add_dropdown("There are", (_NONE,))
+            change = {
+                "Go": self._go_to_event,
+                "Move here": lambda: self._edit_event(edits.move_event),
+                "Copy here": lambda: self._edit_event(edits.copy_event),
+            }
+            self._buttons("This event", change)
+            self._buttons("", {"Delete event": self._delete_event})
+            self._form = EventForm(gui, session, TRACKS, self._actions)
+            self._buttons("At this time", {"Add event": lambda: session.edit(self._form.edit())})
+
+    def _chosen_event(self) -> tuple[str, int] | None:
+        options = list(self._event.options)
+        value = self._event.value
+        return self._numbers[options.index(value)] if self._numbers and value in options else None
+
+    def _edit_event(self, edit: Callable[[str, int, float], edits.Edit]) -> None:
+        if (chosen := self._chosen_event()) is not None:
+            self._session.edit(edit(*chosen, self._session.time))
+
+    def _delete_event(self) -> None:
+        if (chosen := self._chosen_event()) is not None:
+            self._session.edit(edits.delete_event(*chosen))
+
+    def _go_to_event(self) -> None:
+        if (chosen := self._chosen_event()) is not None:
+            track, number = chosen
+            self._session.playback.plays = False
+            self._session.playback.seek(float(self._session.document.content[track][number]["at"]))
+
+    def show(self) -> None:
+        """Show where the session is."""
+        session = self._session
+        if session.version != self._shown_version:
+            self._shown_version = session.version
+            self._show_content()
+        number = session.key
+        if session.is_posed:
+            what = "posed by hand; *Key* keeps it"
+        elif number is None:
+            what = "between keys" if session.poses else "no keys yet; drag the body, then *Key*"
+        else:
+            what = f"key {number + 1} of {len(session.poses)}"
+        text = f"**{as_text(session.document.file.name)}**  \n{session.time:.2f} s, {what}"
+        if self._state.content != text:
+            self._state.content = text
+            self.time.show_time()
+            if number is not None:
+                self._ease.value = session.poses[number].get("ease", _EASES[0])
+        self._ease.disabled = number is None
+        self._joint.show()
+
+    def _show_content(self) -> None:
+        """Have all lists as the document has them."""
+        session, content = self._session, self._session.document.content
+        layers = content.get(KEYS, [])
+        names = [f"{row + 1} {layer.get('name', '')}".strip() for row, layer in enumerate(layers)]
+        self._layer.options = tuple(names) or ("",)
+        self._layer.value = self._layer.options[session.layer if names else 0]
+        self._length.value = float(content.get("duration") or 0.0)
+        self._numbers = [
+            (track, number) for track in TRACKS for number in range(len(content.get(track, [])))
+        ]
+        lines = [describe_event(*each, content[each[0]][each[1]]) for each in self._numbers]
+        chosen = self._event.value
+        self._event.options = tuple(lines) or (_NONE,)
+        self._event.value = chosen if chosen in lines else self._event.options[0]
+        self.time.show_time()
