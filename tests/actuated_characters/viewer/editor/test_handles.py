@@ -1,0 +1,106 @@
+"""What of a character can be taken, what stands, and what a drag moves."""
+
+import numpy as np
+import pytest
+
+from actuated_characters.viewer.editor.handles import Drag, Handle, handles_of, standing_links
+from controller_node.references.posing import Posing
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.character.model import Character
+from tests.support.physics import character
+
+HUMANOID = character("humanoid")
+POSING = Posing(HUMANOID)
+
+
+def rest(body: Character, height: float = 0.0) -> GeneralizedPosition:
+    position = np.array(body.rest_position)
+    position[2] += height
+    return body.layout.configuration(position)
+
+
+def handle_of(name: str) -> Handle:
+    found = {HUMANOID.links[each.row].name: each for each in handles_of(HUMANOID)}
+    return found[name]
+
+
+def drag(name: str, pose: GeneralizedPosition, *, limb_alone: bool = False) -> Drag:
+    stands = standing_links(HUMANOID, pose)
+    return Drag(POSING, HUMANOID, pose, handle_of(name), limb_alone=limb_alone, stands=stands)
+
+
+def test_a_humanoid_is_taken_at_ends_middle_joints_pelvis_and_chest() -> None:
+    sides = {f"{side}_{name}" for side in ("left", "right") for name in
+             ("wrist", "elbow", "knee", "ankle")}  # fmt: skip
+
+    names = {HUMANOID.links[each.row].name for each in handles_of(HUMANOID)}
+
+    assert names == sides | {"base", "chest", "neck"}
+
+
+@pytest.mark.parametrize("name", ["franka_panda", "laikago", "kuka", "pendulum"])
+def test_any_character_has_handles_at_its_ends(name: str) -> None:
+    body = character(name)
+
+    rows = {each.row for each in handles_of(body)}
+
+    assert set(body.end_effectors) <= rows
+    assert (0 in rows) == body.layout.has_floating_base
+
+
+def test_feet_stand_on_the_ground_alone() -> None:
+    assert standing_links(HUMANOID, rest(HUMANOID)) == HUMANOID.feet
+    assert standing_links(HUMANOID, rest(HUMANOID, 0.1)) == ()
+    assert standing_links(character("kuka"), rest(character("kuka"))) == ()
+
+
+def test_a_hand_that_is_dragged_leaves_feet_where_they_stand() -> None:
+    pose = rest(HUMANOID)
+    held = drag("right_wrist", pose)
+
+    found = held.pose(held.place + np.array((0.5, 0.1, 0.3)))
+
+    for foot in HUMANOID.feet:
+        place, turn = POSING.frame(found, foot)
+        assert place == pytest.approx(POSING.frame(pose, foot)[0], abs=1e-3)
+        assert turn == pytest.approx(POSING.frame(pose, foot)[1], abs=5e-3)
+    hand = POSING.place(found, "right_wrist", handle_of("right_wrist").point)
+    assert hand == pytest.approx(held.place + np.array((0.5, 0.1, 0.3)), abs=2e-3)
+
+
+def test_a_foot_that_is_dragged_leaves_the_other_one_alone() -> None:
+    pose = rest(HUMANOID)
+    held = drag("right_ankle", pose)
+
+    found = held.pose(held.place + np.array((0.2, 0.0, 0.2)))
+
+    assert POSING.frame(found, "left_ankle")[0] == pytest.approx(
+        POSING.frame(pose, "left_ankle")[0], abs=1e-3
+    )
+    foot = POSING.place(found, "right_ankle", handle_of("right_ankle").point)
+    assert foot == pytest.approx(held.place + np.array((0.2, 0.0, 0.2)), abs=2e-3)
+
+
+def test_in_the_air_a_hand_leaves_the_root_and_the_pelvis_takes_all_along() -> None:
+    pose = rest(HUMANOID, 0.5)
+    hand, pelvis = drag("right_wrist", pose), drag("base", pose)
+
+    reached = hand.pose(hand.place + np.array((0.1, 0.0, 0.2)))
+    moved = pelvis.pose(pelvis.place + np.array((0.3, 0.0, 0.2)))
+
+    assert reached.position[:6].tolist() == pose.position[:6].tolist()
+    assert moved.position[:3] == pytest.approx(
+        pose.position[:3] + np.array((0.3, 0.0, 0.2)), abs=1e-2
+    )
+    assert moved.position[6:].tolist() == pose.position[6:].tolist()
+
+
+def test_a_limb_alone_is_all_that_moves() -> None:
+    pose = rest(HUMANOID)
+    held = drag("right_wrist", pose, limb_alone=True)
+
+    found = held.pose(held.place + np.array((2.0, 0.0, 2.0)))
+
+    arm = POSING.chain("right_wrist")
+    assert found.position[~arm].tolist() == pose.position[~arm].tolist()
+    assert not np.allclose(found.position[arm], pose.position[arm])
