@@ -5,6 +5,7 @@ them. Names, units and ranges are the concern of who plays it.
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeGuard
 
@@ -96,13 +97,18 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    """A text, in quotes where a reader of decimal numbers would take it for one."""
+@lru_cache(maxsize=1 << 12)  # names of degrees of freedom come again in each pose
+def _is_plain(text: str) -> bool:
+    """Whether a reader of decimal numbers takes a text without quotes for what it is."""
     try:
-        is_plain = files.parse_yaml("text", text, MotionError) == text
+        return bool(files.parse_yaml("text", text, MotionError) == text)
     except MotionError:
-        is_plain = False
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if is_plain else "'")
+        return False
+
+
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = None if _is_plain(text) else "'"
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
 _Dumper.add_representer(str, _represent_text)

@@ -41,20 +41,21 @@ def joints_of(character: Character, pose: Mapping[str, Any]) -> list[str]:
     return [joint.name for joint in joints if any(name in pose for name in joint.dof_names)]
 
 
-def pose_of(
-    character: Character, poses: Sequence[Mapping[str, Any]], number: int
-) -> GeneralizedPosition:
-    """A pose of a layer, whole: what it leaves out is that of the poses before, or of rest.
+def whole_poses(
+    character: Character, poses: Sequence[Mapping[str, Any]]
+) -> list[GeneralizedPosition]:
+    """The poses of a layer, whole: what one leaves out is that of the pose before, or of rest.
 
     Names that are none of the character's, and what is no number, are left out.
     """
-    position = np.array(character.rest_position)
+    position, whole = np.array(character.rest_position), []
     index_of = {name: index for index, name in enumerate(character.layout.dof_names)}
-    for each in poses[: number + 1]:
+    for each in poses:
         for name, value in each["pose"].items():
             if name in index_of and is_number(value):
                 position[index_of[name]] = value
-    return character.layout.configuration(position)
+        whole.append(character.layout.configuration(position.copy()))
+    return whole
 
 
 def mirrored(character: Character, pose: GeneralizedPosition) -> GeneralizedPosition:
@@ -76,7 +77,7 @@ def mirrored_values(
     Raises:
         ClipError: the character is not its own image.
     """
-    image = mirrored(character, pose_of(character, poses, number))
+    image = mirrored(character, whole_poses(character, poses)[number])
     named = joints_of(character, poses[number]["pose"])
     return values_of(character, image, (counterpart(character, name) for name in named))
 
@@ -147,7 +148,8 @@ def _curves(character: Character, poses: Sequence[Mapping[str, Any]]) -> list[Cu
         for row, each in enumerate(poses)
         if row == 0 or each["at"] - poses[row - 1]["at"] >= SHORTEST_TIME
     ]
-    whole = [pose_of(character, poses, row) for row in rows]
+    every = whole_poses(character, poses)
+    whole = [every[row] for row in rows]
     times = np.array([float(poses[row]["at"]) for row in rows])
     eases = [poses[row].get("ease", "smooth") for row in rows]
     position = np.array([pose.position for pose in whole])

@@ -15,6 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.references.posed_body import (
+    LEVER_M,
+    body_of,
+    bounds_of,
+    loads_of,
+    rows_of,
+    units_of,
+)
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.model import Character, Quaternion, Vector
@@ -27,17 +35,8 @@ REACHED_M = 1e-3
 REACHED_RAD = 1e-2
 """rad that an orientation may be off, and is reached."""
 
-_LEVER_M = 0.2  # m: a rad of a link counts as so much, where its orientation is wanted
 _AIM_M = 0.3  # m: where a line of sight is held to the direction that it is to have
-_ROOT_FACTOR = 4.0  # the root moves less readily than a joint
 _LONGEST_TURN = math.pi - 1e-3  # rad of a rotation vector, for which there is one way alone
-_KINDS = {
-    JointType.FIXED: kinematics.FIXED,
-    JointType.REVOLUTE: kinematics.HINGE,
-    JointType.PRISMATIC: kinematics.SLIDER,
-    JointType.SPHERICAL: kinematics.BALL,
-    JointType.FLOATING: kinematics.FLOATING,
-}
 
 
 @dataclass(frozen=True)
@@ -77,9 +76,10 @@ class Posing:
     def __init__(self, character: Character) -> None:
         self._character, self._layout = character, character.layout
         self._names = [link.name for link in character.links]
-        self._body = _body(character)
-        self._lower, self._upper = _bounds(character)
-        self._metric = _metric(character)
+        self._body = body_of(character)
+        self._lower, self._upper = bounds_of(character)
+        self._units = units_of(character)
+        self._metric = self._units * loads_of(character)
         turning = [joint.name for joint in self._layout.joints if joint.rotation is not None]
         self._turning = [
             (number, turning.index(link.joint.name))
@@ -186,7 +186,7 @@ class Posing:
     def _wanted(
         self, pose: GeneralizedPosition, targets: Sequence[Target], holds: Sequence[str]
     ) -> posing.Wanted:
-        frames, lever = self._frames(pose), _LEVER_M * _LEVER_M
+        frames, lever = self._frames(pose), LEVER_M * LEVER_M
         held = [frames[self._number(name)] for name in holds]
         no_turn, none = rotations.IDENTITY_XYZW, (0.0, 0.0, 0.0)
         heaviest = max([1.0, *(target.weight for target in targets)])
@@ -196,9 +196,9 @@ class Posing:
                 [self._number(name) for name in (*(t.link for t in targets), *holds)],
                 dtype=np.intp,
             ),
-            _rows([*(target.point for target in targets), *(none for _ in held)], 3),
-            _rows([*(target.place for target in targets), *(frame[:3] for frame in held)], 3),
-            _rows([*(turn or no_turn for turn in turned), *(frame[3:] for frame in held)], 4),
+            rows_of([*(target.point for target in targets), *(none for _ in held)], 3),
+            rows_of([*(target.place for target in targets), *(frame[:3] for frame in held)], 3),
+            rows_of([*(turn or no_turn for turn in turned), *(frame[3:] for frame in held)], 4),
             np.array([*(target.weight for target in targets), *(heaviest for _ in held)]),
             np.array(
                 [
@@ -219,7 +219,9 @@ class Posing:
             length = float(fixed_order.norm(near[self._layout.rotation_entries[row]]))
             longest[number] = max(_LONGEST_TURN, length)
         lower, upper = np.minimum(self._lower, near), np.maximum(self._upper, near)
-        return posing.Freedom(bases, near, lower, upper, longest, movable, self._metric)
+        return posing.Freedom(
+            bases, near, lower, upper, longest, movable, self._metric, self._units
+        )
 
     def _posed(
         self,
@@ -247,56 +249,6 @@ class Posing:
         return Posed(GeneralizedPosition(position, turns), off[~wanted.held, 0], reached)
 
 
-def _rows(rows: Sequence[object], width: int) -> FloatArray:
-    return np.array(rows, dtype=float).reshape(-1, width)
-
-
 def _vector(values: FloatArray) -> Vector:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def _body(character: Character) -> kinematics.Body:
-    joints, layout = [link.joint for link in character.links], character.layout
-    moves = [joint.type is not JointType.FIXED for joint in joints]
-    coupling, poses = character.coupling, [joint.pose_in_parent for joint in joints]
-    return kinematics.Body(
-        np.array([link.parent for link in character.links], dtype=np.intp),
-        np.array([_KINDS[joint.type] for joint in joints], dtype=np.intp),
-        np.array(
-            [
-                layout.joint(joint.name).start if moving else 0
-                for joint, moving in zip(joints, moves, strict=True)
-            ],
-            dtype=np.intp,
-        ),
-        _rows([pose.position for pose in poses], 3),
-        _rows([pose.orientation_xyzw for pose in poses], 4),
-        _rows([joint.axis_in_child for joint in joints], 3),
-        coupling.followers,
-        coupling.leaders,
-        coupling.multipliers,
-        coupling.offsets,
-    )
-
-
-def _bounds(character: Character) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper bound (n,) of each entry, of ball joints those of their soft limits."""
-    lower, upper = character.coupling.leader_bounds(*character.position_bounds())
-    for joint in character.moving_joints:
-        if joint.soft_limit is not None:
-            entries = character.layout.joint(joint.name).entries
-            lower[entries], upper[entries] = joint.soft_limit.lower, joint.soft_limit.upper
-    return lower, upper
-
-
-def _metric(character: Character) -> FloatArray:
-    """What the square of each entry's change counts (n,): per rad^2, and per m^2 so much more."""
-    metric = np.ones(character.layout.size)
-    for joint in character.layout.joints:
-        if joint.type is JointType.PRISMATIC:
-            metric[joint.entries] = 1.0 / (_LEVER_M * _LEVER_M)
-        elif joint.type is JointType.FLOATING:
-            metric[joint.entries] = _ROOT_FACTOR
-            metric[joint.vectors[0]] /= _LEVER_M * _LEVER_M
-    return metric

@@ -63,6 +63,7 @@ class Freedom(NamedTuple):
     longest: FloatArray  # (l,) rad: bound of the length of each joint's rotation vector
     free: BoolArray  # (n,)
     metric: FloatArray  # (n,) what the square of a coordinate's change counts
+    units: FloatArray  # (n,) likewise, in how far a step goes: 1 a rad^2, and more a m^2
 
 
 @compiled
@@ -169,7 +170,7 @@ def _step(
         row = moving[i]
         for j in range(count):
             matrix[i, j] = products[row, moving[j]]
-        matrix[i, i] += (near + damping) * freedom.metric[row]
+        matrix[i, i] += near * freedom.metric[row] + damping * freedom.units[row]
         right[i, 0] = pull[row]
     solution, step = linear.solve(matrix, 0.0, right), np.zeros(len(q))
     for i in range(count):

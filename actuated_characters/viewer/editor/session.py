@@ -18,8 +18,8 @@ from actuated_characters.timeline.poses import (
     joints_of,
     mirrored,
     mirrored_values,
-    pose_of,
     values_of,
+    whole_poses,
 )
 from actuated_characters.viewer.recorded.timeline import Playback
 from controller_node.references.posing import Posing
@@ -198,7 +198,7 @@ class Session:
         pose = self.pose
         if number is not None and not self.is_posed:
             joints = joints_of(self.character, self.poses[number]["pose"])
-            pose = pose_of(self.character, self.poses, number)
+            pose = whole_poses(self.character, self.poses)[number]
         self._copied = values_of(self.character, pose, joints)
 
     def paste(self) -> None:

@@ -9,8 +9,8 @@ from actuated_characters.timeline.poses import (
     Preview,
     mirrored,
     mirrored_values,
-    pose_of,
     values_of,
+    whole_poses,
 )
 from tests.support.physics import character, random_state
 
@@ -28,7 +28,7 @@ def test_a_pose_keeps_what_the_ones_before_say() -> None:
         {"at": 1.0, "pose": {"right_elbow": 0.2, "tail": 3.0, "left_knee": True}},
     ]
 
-    pose = pose_of(HUMANOID, poses, 1)
+    pose = whole_poses(HUMANOID, poses)[1]
 
     named = values_of(HUMANOID, pose, ["right_elbow", "left_elbow", "left_knee"])
     assert named == {"right_elbow": 0.2, "left_elbow": 0.5, "left_knee": 0.0}

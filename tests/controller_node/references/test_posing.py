@@ -156,6 +156,20 @@ def test_an_arm_stretches_towards_what_is_out_of_reach(distance: float) -> None:
     assert np.linalg.norm(hand) == pytest.approx(0.274788 + 0.258947, abs=1e-3)
 
 
+def test_an_arm_reaches_before_the_trunk_bends_or_the_pelvis_moves() -> None:
+    posing, pose = Posing(HUMANOID), standing(HUMANOID)
+    shoulder = posing.frame(pose, "right_shoulder")[0]
+    target = Target("right_wrist", tuple(shoulder + np.array((0.4, -0.1, 0.1))))
+
+    found = posing.fit(pose, [target], holds=HUMANOID.feet)
+
+    assert found.reached
+    moved = np.abs(HUMANOID.layout.difference(pose, found.pose))
+    assert moved[HUMANOID.layout.mask(["chest"])].max() < 0.15
+    assert moved[:3].max() < 0.02
+    assert moved[HUMANOID.layout.mask(["right_shoulder"])].max() > 1.0
+
+
 def test_a_hand_that_is_dragged_out_of_reach_and_back_never_jumps() -> None:
     posing, pose = Posing(HUMANOID), standing(HUMANOID)
     start = posing.frame(pose, "right_wrist")[0]
