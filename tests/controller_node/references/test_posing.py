@@ -1,5 +1,9 @@
 """Inverse kinematics: MuJoCo's kinematics as the oracle, limits, feet that stay, no blow-up."""
 
+import hashlib
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -297,6 +301,42 @@ def test_what_mimics_a_joint_follows_it(tmp_path: Path) -> None:
 
     assert found.reached
     assert found.pose.position == pytest.approx(goal.position, abs=1e-3)
+
+
+HASH = """
+import hashlib
+from tests.controller_node.references.test_posing import *
+print(hashlib.sha256(found_of(3).pose.position.tobytes()).hexdigest())
+"""
+
+
+def found_of(seed: int) -> Posed:
+    """What is found for three places, some of them out of reach."""
+    posing, pose = Posing(HUMANOID), standing(HUMANOID)
+    rng = np.random.default_rng(seed)
+    targets = [
+        Target(name, tuple(posing.frame(pose, name)[0] + 0.3 * rng.normal(size=3)))
+        for name in ("right_wrist", "left_wrist", "neck")
+    ]
+    return posing.fit(pose, targets, holds=HUMANOID.feet)
+
+
+@pytest.mark.slow
+def test_the_processors_kernels_do_not_matter() -> None:
+    features = " ".join(np._core._multiarray_umath.__cpu_dispatch__)
+    other = {"NPY_DISABLE_CPU_FEATURES": features, "OPENBLAS_CORETYPE": "Nehalem"}
+
+    apart = subprocess.run(
+        [sys.executable, "-c", HASH],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+        env=os.environ | other,
+    )
+
+    own = hashlib.sha256(found_of(3).pose.position.tobytes()).hexdigest()
+    assert apart.stdout.strip() == own
 
 
 def test_an_unknown_link_is_named_with_those_that_there_are() -> None:
