@@ -20,7 +20,7 @@ Content: TypeAlias = Mapping[str, Any]
 KEYS = "keys"
 TRACKS = ("clips", "steering", "reach", "look", "limp", "strengths", "pushes", "throws")
 """The lists of events."""
-TOP_LEVEL = ("character", "duration", "run", KEYS, *TRACKS)
+TOP_LEVEL = ("character", "duration", "run", "set", KEYS, *TRACKS)
 
 _LINE_WIDTH = 110  # characters
 
