@@ -132,7 +132,7 @@ def set_pose_value(layer: int, number: int, name: str, value: float) -> Edit:
 
 
 def set_ease(layer: int, number: int, ease: str) -> Edit:
-    """Set how a pose is moved through: `smooth`, `rest` or `linear`."""
+    """Set how a pose is moved through: `smooth` or `rest`."""
 
     def edit(content: Content) -> Content:
         changed = {**_pose(content, layer, number), "ease": ease}

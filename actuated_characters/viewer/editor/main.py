@@ -39,4 +39,7 @@ def show_editor(
         page = EditorPage(server, session, skin)
         for line in address:
             print(line, flush=True)
-        page.play(fps, rejections)
+        try:
+            page.play(fps, rejections)
+        finally:
+            page.takes.cancel()

@@ -12,22 +12,24 @@ from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.drawing.drawn_character import DrawnCharacter, LinkMesh
 from actuated_characters.viewer.drawing.sample import CharacterSample
-from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene
+from actuated_characters.viewer.drawing.scene import WORLD, BrowserScene, DrawnBalls
 from actuated_characters.viewer.drawing.scene_poses import set_poses
 from actuated_characters.viewer.editor.handles import Drag, Handle, handles_of, standing_links
 from actuated_characters.viewer.editor.key_marks import find_key_marks
 from actuated_characters.viewer.editor.panel import EditorPanel
 from actuated_characters.viewer.editor.session import Session
+from actuated_characters.viewer.editor.shown_takes import NO_TAKE, ShownTakes
 from actuated_characters.viewer.recorded.time_bar import TimeBar
+from actuated_characters.viewer.recorded.timeline import row_at
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.server import ViewerServer
 from msgs_config.arrays import FloatArray
+from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.messages.state import StampedState
 
 _LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
 _HANDLE, _HANDLE_OPACITY = (240, 140, 20), 0.4
 _LEAST_RADIUS, _AROUND = 0.065, 0.015  # m: of a handle, and beyond what is round of its link
-_HIDDEN = ("reference", "torques")  # there is none here
 
 
 class EditorPage:
@@ -55,10 +57,11 @@ class EditorPage:
             0,
             skin,
         )
-        self._drawn.shows = {name: name not in _HIDDEN for name in self._drawn.shows}
+        self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
+        self.takes = ShownTakes(session.document.file)
         self._handles = handles_of(character)
         self._spheres = [self._add_handle(handle) for handle in self._handles]
-        self._panel = EditorPanel(server.gui, session, self._actions)
+        self._panel = EditorPanel(server.gui, session, self.takes, self._actions)
         self._bar = TimeBar(server, session.playback, self._panel.time)
         self._marked = -1  # the version of the session whose marks are shown
         self._drag: Drag | None = None
@@ -101,7 +104,8 @@ class EditorPage:
     def _dragged(self, handle: Handle, event: "viser.SceneNodeDragEvent[Any]") -> None:
         session = self._session
         if event.phase == "start":
-            pose = session.pose
+            pose = self._seen_pose()
+            self.takes.choose(NO_TAKE)
             session.take_pose(pose)
             stands = standing_links(session.character, pose) if self._panel.feet_stay else ()
             self._drag = Drag(
@@ -119,6 +123,14 @@ class EditorPage:
         session.take_pose(self._drag.pose(self._drag.place + way))
         if event.phase == "end":
             self._drag = self._client = None
+
+    def _seen_pose(self) -> GeneralizedPosition:
+        """The pose that is seen: of the take, or of the session."""
+        session = self._session
+        position = self.takes.position(session.time)
+        return (
+            session.pose if position is None else session.character.layout.configuration(position)
+        )
 
     def play(self, fps: float, rejections: Rejections) -> None:
         """Show it until an interruption, and print what is rejected."""
@@ -139,10 +151,14 @@ class EditorPage:
 
     def draw(self) -> None:
         """Bring all pages to the session."""
-        session, pose = self._session, self._session.pose
-        still = np.zeros(session.character.layout.size)
+        session = self._session
+        sample = self.takes.sample(session.time)
+        if sample is None:
+            still = np.zeros(session.character.layout.size)
+            sample = CharacterSample(StampedState(0, session.pose.position, still, None))
         with self._server.atomic():
-            self._drawn.draw(CharacterSample(StampedState(0, pose.position, still, None)))
+            self._drawn.draw(sample)
+            self._draw_balls()
             places = [self._drawn.point(each.row, np.array(each.point)) for each in self._handles]
             turns = self._drawn.turns_xyzw[[each.row for each in self._handles]]
             set_poses(self._spheres, np.array(places).reshape(-1, 3), turns)
@@ -151,3 +167,15 @@ class EditorPage:
         if self._marked != session.version:
             self._marked = session.version
             self._bar.mark(find_key_marks(session.document.content, session.playback.end))
+
+    def _draw_balls(self) -> None:
+        """Draw the balls of the take that is seen."""
+        run, radii = self.takes.run, list[float]()
+        balls = None
+        if run is not None:
+            balls, radii = run.balls(row_at(run.times, self._session.time))
+        if radii != self._radii:
+            self._balls.remove()
+            self._radii = radii
+        if balls is not None:
+            self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)

@@ -14,27 +14,35 @@ from actuated_characters.viewer.editor.event_forms import describe_event
 from actuated_characters.viewer.editor.event_panel import EventForm
 from actuated_characters.viewer.editor.joint_panel import JointFields
 from actuated_characters.viewer.editor.session import Session
+from actuated_characters.viewer.editor.shown_takes import ShownTakes
+from actuated_characters.viewer.editor.take_panel import TakePanel
 from actuated_characters.viewer.recorded.playback_controls import PlaybackControls, on
+from controller_node.references.timeline.description import Ease
 from msgs_config.errors import ActuatedCharactersError
 
 _WHOLE, _LIMB = "whole body", "limb alone"
 _ALL, _MOVED = "all joints", "joints that moved"
 _NONE = "none"
-_EASES = ("smooth", "rest", "linear")
+_EASES = tuple(ease.value for ease in Ease)
 
 
 class EditorPanel:
     """The panel of all clients; what it does is done in the thread that runs the actions."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session, actions: ActionQueue) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, session: Session, takes: ShownTakes, actions: ActionQueue
+    ) -> None:
         self._gui, self._session, self._actions = gui, session, actions
+        self._takes = takes
         self._shown_version, self._numbers = -1, list[tuple[str, int]]()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("")
         self._told = gui.add_markdown("", visible=False)
+        self._wrong = gui.add_markdown("", visible=False)
         self.time = PlaybackControls(gui, session.playback, actions)
         self._add_keys()
+        self._take_panel = TakePanel(gui, takes, self.act, self.tell, actions)
         with gui.add_folder("Dragging", expand_by_default=False):
             self._moves: Any = gui.add_dropdown("Moves", (_WHOLE, _LIMB))
             self._stands: Any = gui.add_checkbox("Feet stay", initial_value=True)
@@ -153,11 +161,14 @@ class EditorPanel:
     def show(self) -> None:
         """Show where the session is."""
         session = self._session
+        self._take_panel.show()
         if session.version != self._shown_version:
             self._shown_version = session.version
             self._show_content()
         number = session.key
-        if session.is_posed:
+        if self._takes.run is not None:
+            what = f"take {self._takes.chosen}"
+        elif session.is_posed:
             what = "posed by hand; *Key* keeps it"
         elif number is None:
             what = "between keys" if session.poses else "no keys yet; drag the body, then *Key*"
@@ -174,6 +185,8 @@ class EditorPanel:
 
     def _show_content(self) -> None:
         """Have all lists as the document has them."""
+        self._wrong.content = "  \n".join(map(as_text, self._session.preview.errors))
+        self._wrong.visible = bool(self._session.preview.errors)
         session, content = self._session, self._session.document.content
         layers = content.get(KEYS, [])
         names = [f"{row + 1} {layer.get('name', '')}".strip() for row, layer in enumerate(layers)]

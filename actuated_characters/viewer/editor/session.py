@@ -14,13 +14,13 @@ from actuated_characters.timeline.content import KEYS, TRACKS, is_number
 from actuated_characters.timeline.document import Document
 from actuated_characters.timeline.edits import SHORTEST_TIME, Edit
 from actuated_characters.timeline.poses import (
-    Preview,
     joints_of,
     mirrored,
     mirrored_values,
     values_of,
     whole_poses,
 )
+from actuated_characters.timeline.preview import Preview
 from actuated_characters.viewer.recorded.timeline import Playback
 from controller_node.references.posing import Posing
 from msgs_config.arrays import FloatArray
@@ -47,7 +47,7 @@ class Session:
         """Another one after each change of the document."""
         self._copied: dict[str, float] | None = None
         self._posed: tuple[float, GeneralizedPosition] | None = None  # and the time of that
-        self._preview = Preview(character, document.content)
+        self.preview = Preview(character, document.file)
         self._take_content()
 
     def _take_content(self) -> None:
@@ -55,7 +55,7 @@ class Session:
         self.version += 1
         content = self.document.content
         self.layer = min(self.layer, max(len(content.get(KEYS, [])) - 1, 0))
-        self._preview = Preview(self.character, content)
+        self.preview.take(content)
         self.playback.times = self._times()
         self.playback.seek(self.playback.time)
 
@@ -105,7 +105,7 @@ class Session:
         """The pose that is seen: that of a hand, until the time is another one, or of the keys."""
         if self._posed is not None and self._posed[0] == self.time:
             return self._posed[1]
-        return self._preview.at(self.time)
+        return self.preview.at(self.time)
 
     @property
     def is_posed(self) -> bool:
@@ -156,7 +156,7 @@ class Session:
 
     def _moved_joints(self, pose: GeneralizedPosition) -> set[str]:
         layout = self.character.layout
-        before = self._preview.at(self.time)
+        before = self.preview.at(self.time)
         moved = np.abs(layout.difference(before, pose)) > _SAME
         return {joint.name for joint in layout.joints if moved[joint.entries].any()}
 

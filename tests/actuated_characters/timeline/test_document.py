@@ -37,7 +37,7 @@ EDITS: st.SearchStrategy[Edit] = st.one_of(
     st.builds(edits.add_layer, NAMES),
     st.builds(edits.delete_layer, ROWS),
     st.builds(edits.set_layer, ROWS, st.sampled_from(["in", "out"]), VALUES),
-    st.builds(edits.add_pose, ROWS, TIMES, POSES, st.sampled_from([None, "rest", "linear"])),
+    st.builds(edits.add_pose, ROWS, TIMES, POSES, st.sampled_from([None, "rest", "smooth"])),
     st.builds(edits.move_pose, ROWS, ROWS, TIMES),
     st.builds(edits.copy_pose, ROWS, ROWS, TIMES),
     st.builds(edits.delete_pose, ROWS, ROWS),

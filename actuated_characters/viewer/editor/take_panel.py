@@ -1,0 +1,61 @@
+"""The folder of the panel for takes: simulate, choose one, compare it with another."""
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from actuated_characters.viewer.controls.actions import ActionQueue
+from actuated_characters.viewer.editor.shown_takes import NO_TAKE, ShownTakes
+from actuated_characters.viewer.recorded.playback_controls import on
+
+_SIMULATE, _CANCEL = "Simulate", "Cancel"
+_WANTED = "what is wanted"
+
+
+class TakePanel:
+    """What all clients see of takes."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        takes: ShownTakes,
+        act: Callable[[Callable[[], object]], None],
+        tell: Callable[[str], None],
+        actions: ActionQueue,
+    ) -> None:
+        """`act` does something, and says what was wrong with it; `tell` says a sentence."""
+        self._takes, self._tell = takes, tell
+        self._shown = -1
+        with gui.add_folder("Takes"):
+            self._title: Any = gui.add_text("Title", "", hint="what is said of the next take")
+            buttons = gui.add_button_group("Take", (_SIMULATE, _CANCEL))
+            on(actions, buttons, lambda name: act(self._functions[name]), click=True)
+            self._take: Any = gui.add_dropdown("Seen", (NO_TAKE,))
+            on(actions, self._take, lambda label: act(lambda: takes.choose(label)))
+            self._other: Any = gui.add_dropdown("Outline", (_WANTED,))
+            on(actions, self._other, lambda label: act(lambda: takes.compare(label)))
+        self._functions = {_SIMULATE: self._simulate, _CANCEL: takes.cancel}
+        self.show()
+
+    def _simulate(self) -> None:
+        self._takes.simulate(str(self._title.value).strip())
+        self._title.value = ""
+
+    def show(self) -> None:
+        """Show what there is, and say what has come of the take that was made."""
+        said = self._takes.advance()
+        if said:
+            self._tell(said)
+        seconds = self._takes.making
+        if seconds is not None:
+            self._tell(f"simulating for {seconds:.0f} s")
+        if self._shown == self._takes.version:
+            return
+        self._shown = self._takes.version
+        labels = tuple(self._takes.names)
+        self._take.options = (NO_TAKE, *labels)
+        self._take.value = self._takes.chosen
+        other = self._other.value
+        self._other.options = (_WANTED, *labels)
+        self._other.value = other if other in self._other.options else _WANTED
