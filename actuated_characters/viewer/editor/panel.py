@@ -174,7 +174,7 @@ class EditorPanel:
             what = "between keys" if session.poses else "no keys yet; drag the body, then *Key*"
         else:
             what = f"key {number + 1} of {len(session.poses)}"
-        text = f"**{as_text(session.document.file.name)}**  \n{session.time:.2f} s, {what}"
+        text = f"**{as_text(session.document.file.name)}**  \n{session.time:.3f} s, {what}"
         if self._state.content != text:
             self._state.content = text
             self.time.show_time()
