@@ -151,3 +151,27 @@ def test_a_joint_is_set_by_its_number_within_its_limits(page: EditorPage, sessio
 
     assert session.pose.position[HUMANOID.layout.joint("right_elbow").start] == 3.14
     assert fields._fields[0].value == 3.14
+
+
+@pytest.mark.parametrize("name", ["franka_panda", "laikago", "pendulum"])
+def test_any_character_can_be_posed(name: str, tmp_path: Path) -> None:
+    whole = character(name)
+    session = Session(whole, Document(tmp_path / "a.yaml", f"character: {name}\n"))
+    with serving("127.0.0.1", 0) as (server, _, _):
+        page = EditorPage(server, session)
+        handle = page._handles[-1]
+        start = page._drawn.point(handle.row, np.array(handle.point))
+        for phase in ("start", "end"):
+            event: Any = SimpleNamespace(
+                phase=phase,
+                client_id=1,
+                start_position=tuple(start),
+                end_position=tuple(start + np.array((0.02, 0.0, 0.05))),
+            )
+            page._dragged(handle, event)
+        page.step(0.0)
+        click(page, "Key")
+
+    named = Document(session.document.file).content["keys"][0]["poses"][0]["pose"]
+    assert list(named) == list(whole.layout.dof_names)
+    assert not np.allclose(list(named.values()), whole.rest_position, atol=1e-6)
