@@ -46,7 +46,6 @@ class EditorPage:
         self._server, self._session = server, session
         self._actions = ActionQueue()
         self._scene = BrowserScene(server)
-        self._scene.follows = False  # the world must not move while something is dragged
         character = session.character
         self._drawn = DrawnCharacter(
             self._scene.api,
@@ -148,6 +147,8 @@ class EditorPage:
         self._actions.run()
         self._session.playback.advance(seconds)
         self.draw()
+        if self._drag is None:  # the world must not move while something is dragged
+            self._scene.follow_characters([self._drawn], seconds)
 
     def draw(self) -> None:
         """Bring all pages to the session."""
@@ -162,6 +163,8 @@ class EditorPage:
             places = [self._drawn.point(each.row, np.array(each.point)) for each in self._handles]
             turns = self._drawn.turns_xyzw[[each.row for each in self._handles]]
             set_poses(self._spheres, np.array(places).reshape(-1, 3), turns)
+            for sphere in self._spheres:  # a take is seen without; its links can be dragged
+                sphere.visible = self.takes.run is None
             self._bar.show_time()
         self._panel.show()
         if self._marked != session.version:

@@ -41,8 +41,9 @@ class EditorPanel:
         self._told = gui.add_markdown("", visible=False)
         self._wrong = gui.add_markdown("", visible=False)
         self.time = PlaybackControls(gui, session.playback, actions)
-        self._add_keys()
+        self._add_edits()
         self._take_panel = TakePanel(gui, takes, self.act, self.tell, actions)
+        self._add_keys()
         with gui.add_folder("Dragging", expand_by_default=False):
             self._moves: Any = gui.add_dropdown("Moves", (_WHOLE, _LIMB))
             self._stands: Any = gui.add_checkbox("Feet stay", initial_value=True)
@@ -79,13 +80,16 @@ class EditorPanel:
         group: Any = self._gui.add_button_group(label, tuple(functions))
         on(self._actions, group, lambda name: self.act(functions[name]), click=True)
 
-    def _add_keys(self) -> None:
-        gui, session = self._gui, self._session
+    def _add_edits(self) -> None:
+        session = self._session
         self._buttons(
             "Pose",
             {"Key": session.set_key, "Mirror": session.mirror, "Delete": session.delete_key},
         )
         self._buttons("Edits", {"Undo": session.undo, "Redo": session.redo})
+
+    def _add_keys(self) -> None:
+        gui, session = self._gui, self._session
         with gui.add_folder("Keys"):
             self._layer: Any = gui.add_dropdown("Layer", ("",))
             on(self._actions, self._layer, self._choose_layer)
