@@ -56,10 +56,10 @@ def _compare(options: argparse.Namespace) -> int:
         raise ConfigurationError(f"--tolerance is {tolerance}; it must be 0 or more")
     if output is not None and output.suffix.lower() != ".png":
         raise ConfigurationError(f"--output {output}: it must be a .png file")
-    from actuated_characters.bags.recording import read_recordings
+    from actuated_characters.bags.whole import read_whole
     from actuated_characters.report.comparison import compare, pair
 
-    pairs = pair(read_recordings(options.first), read_recordings(options.second))
+    pairs = pair(read_whole(options.first), read_whole(options.second))
     comparisons = [compare(first, second, tolerance) for first, second in pairs]
     console = Console()
     for comparison in comparisons:

@@ -1,28 +1,38 @@
 """A command in a process beside the viewer, which does not wait for its end."""
 
+import json
 import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 
-_MODULE = "actuated_characters.cli"
+_MODULE, _PREPARED = "actuated_characters.cli", "actuated_characters.prepared_main"
 _PATIENCE = 10.0  # s in which a command can end in good order
 
 
 class CommandProcess:
     """A command of `actuated_characters` that is being done."""
 
-    def __init__(self, arguments: Sequence[str]) -> None:
-        """Begin."""
+    def __init__(self, arguments: Sequence[str] | None = None) -> None:
+        """Begin; without arguments, be ready to do what `begin` says."""
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by `cancel`
+        module = [_PREPARED] if arguments is None else [_MODULE, *arguments]
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", _MODULE, *arguments],
-            stdin=subprocess.DEVNULL,
+            [sys.executable, "-P", "-m", *module],
+            stdin=subprocess.PIPE if arguments is None else subprocess.DEVNULL,
             stdout=self._output,
             stderr=subprocess.STDOUT,
             start_new_session=True,  # Ctrl-C is for the viewer, which ends this in its own way
         )
+
+    def begin(self, arguments: Sequence[str]) -> None:
+        """Begin a command in a process that was made without."""
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):  # it has ended, and will say why
+            self._process.stdin.write(json.dumps(list(arguments)).encode() + b"\n")
+            self._process.stdin.flush()
 
     @property
     def has_ended(self) -> bool:
@@ -51,4 +61,6 @@ class CommandProcess:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
         self._output.close()

@@ -42,4 +42,4 @@ def show_editor(
         try:
             page.play(fps, rejections)
         finally:
-            page.takes.cancel()
+            page.takes.close()

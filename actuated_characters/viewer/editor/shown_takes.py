@@ -25,6 +25,7 @@ class ShownTakes:
         self._run: RecordedRun | None = None  # of the chosen one
         self._other: RecordedRun | None = None  # what it is compared with
         self._process: CommandProcess | None = None
+        self._ready: CommandProcess | None = None  # for the next one, once there was one
         self._begun = 0.0
         self.version = 0
         """Another one after each change of what there is, or is seen."""
@@ -96,7 +97,9 @@ class ShownTakes:
         arguments = ["take", str(self._file), f"--title={title}"]
         if self._chosen is not None:
             arguments += ["--of", self._chosen.name]
-        self._process, self._begun = CommandProcess(arguments), time.monotonic()
+        self._process, self._begun = self._ready or CommandProcess(), time.monotonic()
+        self._ready = None
+        self._process.begin(arguments)
 
     def cancel(self) -> None:
         """End the take that is being made."""
@@ -104,12 +107,19 @@ class ShownTakes:
             self._process.cancel()
             self._process = None
 
+    def close(self) -> None:
+        """End all processes."""
+        self.cancel()
+        if self._ready is not None:
+            self._ready.cancel()
+
     def advance(self) -> str | None:
         """See the take that was made, once it is; returns what was said of it, then."""
         process = self._process
         if process is None or not process.has_ended:
             return None
         self._process = None
+        self._ready = CommandProcess()  # while what was made is looked at
         words, error = process.lines(), process.error
         process.cancel()
         before = {take.name for take in self._known}

@@ -1,5 +1,6 @@
 """The command `take`: what it says of a timeline's takes, and what it refuses."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,9 @@ def test_takes_are_made_listed_and_go_on_from_each_other(
     assert "take 3, of take 1" in said(file, "--of", "1")
     assert "take 4: 0.6 s from the beginning" in said(file, "--from-start")
 
+    takes = tmp_path / "moves.takes"
+    assert main(["compare", str(takes / "2"), str(takes / "3")]) == 1  # both with their past
+    assert re.search(r"first difference: tick \d+, at 0\.50\d+ s", capsys.readouterr().out)
     table = said(file, "--list").splitlines()
     rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in table if "│" in line]
     assert [(row[0], row[1], row[3]) for row in rows] == [

@@ -36,7 +36,7 @@ def page(file: Path) -> Iterator[EditorPage]:
     with serving("127.0.0.1", 0) as (server, _, _):
         page = EditorPage(server, session)
         yield page
-        page.takes.cancel()
+        page.takes.close()
 
 
 def finish(page: EditorPage) -> None:
