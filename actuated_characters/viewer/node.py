@@ -128,6 +128,9 @@ class ViewerNode(Node):
         """Bring the scene to the newest states; `seconds` since the last call."""
         for watched in self._simulators.changed():
             self._rebuild(watched)
+        for watched in self._simulators.characters:
+            if watched.is_new_episode and watched.below in self._drawn:
+                self._drawn[watched.below].begin_episode()
         self._simulators.watch(watches=is_watched)
         self._actions.run()
         self._show_panel()

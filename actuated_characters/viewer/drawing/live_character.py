@@ -62,6 +62,11 @@ class LiveCharacter(DrawnCharacter):
         if self._tag is not None and sample.state is not None:
             self._tag.draw(sample.state, self.origins, sample.mode)
 
+    def begin_episode(self) -> None:
+        """Forget what stands above it of the episode before."""
+        if self._tag is not None:
+            self._tag.begin_episode()
+
     def take(self, rebuilt: Rebuilt) -> bool:
         """Take another description if it looks alike, in a world alike; whether it does."""
         if rebuilt.world != self.rebuilt.world or _weighs(rebuilt) != _weighs(self.rebuilt):

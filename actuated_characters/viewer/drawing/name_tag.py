@@ -40,10 +40,14 @@ class FallCounter:
         self._counted = False
         self._last_ns = 0
 
+    def begin_episode(self) -> None:
+        """Forget the falls so far; a simulator's stamps go on where it is reset."""
+        self.count, self._down_since, self._counted = 0, None, False
+
     def take(self, state: StampedState) -> None:
         """Take a newer state; one that is older begins a new episode, with no falls so far."""
         if state.stamp_ns < self._last_ns:
-            self.count, self._down_since, self._counted = 0, None, False
+            self.begin_episode()
         self._last_ns = state.stamp_ns
         body = self._reader.read(state.position[np.newaxis])
         anything = PostureSeries(np.full(1, np.nan), np.full((1, 3), np.nan))
@@ -79,6 +83,11 @@ class NameTag:
         self._label = scene.add_label(
             f"{frame}/tag", name, anchor="bottom-center", font_screen_scale=scale
         )
+
+    def begin_episode(self) -> None:
+        """Forget the falls of the episode before."""
+        if self._falls is not None:
+            self._falls.begin_episode()
 
     def draw(self, state: StampedState, origins: FloatArray, mode: str) -> None:
         """Show what a character is doing whose links (l, 3) are there, m, world."""

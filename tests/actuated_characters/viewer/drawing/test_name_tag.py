@@ -45,11 +45,20 @@ def test_a_moment_on_the_ground_is_no_fall() -> None:
     assert show(counter(), [STANDING, lying(), lying(), STANDING]) == 0
 
 
-def test_a_new_episode_begins_with_no_falls() -> None:
+def test_a_simulator_that_began_anew_begins_with_no_falls() -> None:
     falls = counter()
     show(falls, 10 * [lying()])
 
     assert show(falls, [STANDING]) == 0
+
+
+def test_a_new_episode_has_no_falls_where_its_stamps_go_on() -> None:
+    falls = counter()
+    show(falls, 10 * [lying()])
+    falls.begin_episode()
+
+    assert show(falls, [STANDING], 10) == 0
+    assert show(falls, 10 * [lying()], 11) == 1
 
 
 @pytest.mark.parametrize(
