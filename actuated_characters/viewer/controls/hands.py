@@ -67,7 +67,7 @@ class Hands:
             return f"no balls: {error}"
         for throw in throws:
             self._send(character, throw)
-        return f"{len(throws)} balls; an episode has at most {MOST_BALLS}, then Reset"
+        return f"{len(throws)} more balls; an episode has at most {MOST_BALLS}, then Reset"
 
     def _send(self, character: LiveCharacter, throw: ProjectileThrow) -> None:
         world, codec = character.rebuilt.world, ThrowCodec(character.rebuilt.known.session)

@@ -38,7 +38,7 @@ def _rows(
     if has_sides and shows["skin"]:
         yield RIGHT_SIDE, _AREA, "darker: its right side"
         if one_of_several:
-            yield RIGHT_SIDE, _AREA, "a colour for each character, or team"
+            yield RIGHT_SIDE, _AREA, "each character, or team, has its colour"
     if shows["forces"]:
         yield CONTACT, _ARROW, "force of the ground (0.5 m: its weight)"
         yield PUSH, _ARROW, "push"

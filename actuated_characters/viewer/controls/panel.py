@@ -35,7 +35,7 @@ _SPEEDS = {"as fast as it can": 0.0, "0.1": 0.1, "0.25": 0.25, "0.5": 0.5, "1": 
 _PAUSE, _RESUME, _STEP, _RESET = "Pause", "Resume", "Step", "Reset"
 _HELP = (
     "Drag a body to pull it. Shift and click throws a ball at it. Drag the background to look "
-    "around."
+    "around; the wheel zooms."
 )
 _TEXT_PERIOD = 0.2  # s between texts: the page lays each out
 _NAME_OF_ONLY_CHARACTER = "alone"  # the character of a simulator that has one, without a name

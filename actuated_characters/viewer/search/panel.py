@@ -82,7 +82,7 @@ class SearchPanel:
         if costs := sorted(each.cost for each in window.worlds if each.cost is not None):
             sentences.append(f"Costs {as_cost(costs[0])} to {as_cost(costs[-1])}.")
         sentences.append(
-            f"So far all were lost {window.failures} times."
+            f"So far all were lost {_times(window.failures)}."
             if window.failures
             else "So far in no window all were lost."
         )
@@ -97,6 +97,10 @@ class SearchPanel:
         self._state.content = f"**{self._title}**, {seconds:.2f} s"
         again = f" *{EARLIER}* shows the windows again." if earlier else ""
         self._told.content = f"**{as_text(motion.word)}**: {as_text(motion.about)}{again}"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def _legend() -> str:

@@ -86,7 +86,7 @@ def test_where_all_are_lost_it_says_that_the_search_goes_back(player: SearchPlay
     player.draw(0.0)
 
     assert "0 kept, 4 lost. **All are lost**: the search goes back" in player.panel.text
-    assert "So far all were lost 1 times." in player.panel.text
+    assert "So far all were lost once." in player.panel.text
 
 
 def test_worlds_begin_in_their_places_and_the_best_path_is_before_them(
