@@ -89,7 +89,8 @@ class SearchPanel:
         if window.hidden:
             sentences.append(f"{window.hidden} more worlds, which are not kept, are not shown.")
         if newest > 0:
-            sentences.append(f"{newest} later ones: *{LATER}*, *{NEWEST}*.")
+            ones = "one" if newest == 1 else "ones"
+            sentences.append(f"{newest} later {ones}: *{LATER}*, *{NEWEST}*.")
         self._told.content = " ".join(sentences)
 
     def show_motion(self, motion: MotionNews, seconds: float, earlier: int) -> None:

@@ -139,7 +139,7 @@ def test_earlier_windows_can_be_seen_again(player: SearchPlayer) -> None:
         return player.panel.text
 
     assert "Window 3 of" in after(NEWEST)
-    assert "Window 2 of" in (text := after(EARLIER)) and "1 later ones" in text
+    assert "Window 2 of" in (text := after(EARLIER)) and "1 later one:" in text
     assert "Window 1 of" in after(EARLIER)
     player.take(window(4))
     assert "Window 1 of" in (text := after(EARLIER)) and "3 later ones" in text
