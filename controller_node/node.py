@@ -110,7 +110,7 @@ class ControllerNode(ComposableNode):
             self.node,
             topics.CONTROLLER_KEYFRAME.of(self.node.get_name()),
             controller.clock,
-            ControllerOptions.of(self._values).keyframes.period,
+            ControllerOptions.of(self._values).keyframes,
             at_once=bool(self._going_on),
         )
         self._publish_configuration()

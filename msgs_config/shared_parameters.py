@@ -59,12 +59,21 @@ class KeyframeSettings(Settings):
         unit="s",
         maximum=1e6,
     )
+    budget: int = parameter(
+        60,
+        "of keyframes in simulated time: where they are larger, they come less often; the other "
+        "messages of a humanoid take twenty times that, a keyframe of a planner 2,000 kB",
+        name="keyframe_budget",
+        unit="kB/s",
+        minimum=1,
+        maximum=1_000_000,
+    )
     file: str = parameter("", "file of a keyframe, from which the run goes on", name="resume_from")
 
 
 CHARACTER, COLLISION, PLACEMENT = CharacterSource.declared()
 RATE, GRAVITY, COMMAND_DELAY = SharedSettings.declared()
-KEYFRAME_PERIOD, RESUME_FROM = KeyframeSettings.declared()
+KEYFRAME_PERIOD, KEYFRAME_BUDGET, RESUME_FROM = KeyframeSettings.declared()
 
 
 def collides(given: Mapping[str, object]) -> bool:

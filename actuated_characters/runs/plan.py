@@ -28,7 +28,13 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
 from msgs_config.parameters import Values
 from msgs_config.plain_values import as_plain, plain_parameters
-from msgs_config.shared_parameters import KEYFRAME_PERIOD, RESUME_FROM, collides, placed
+from msgs_config.shared_parameters import (
+    KEYFRAME_BUDGET,
+    KEYFRAME_PERIOD,
+    RESUME_FROM,
+    collides,
+    placed,
+)
 from sim_node import parameters as simulator_parameters
 from sim_node.initial_state import INITIAL_STATE, CharacterSettings, as_values, describe_start
 from sim_node.node_settings import NodeSettings
@@ -39,7 +45,7 @@ from sim_node.physics.short_links import describe_speed_bound
 
 SHARED = (
     *("rate", "gravity", "placement", "collision", "command_delay_ticks"),
-    KEYFRAME_PERIOD.name,
+    *(KEYFRAME_PERIOD.name, KEYFRAME_BUDGET.name),
 )
 """The same on both sides; set on one, they count on both."""
 _LARGEST_DURATION = 1e9  # s

@@ -24,12 +24,13 @@ from controller_node.planner.settings import (
 from controller_node.references.base import Reference
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import KEYFRAME_PERIOD
+from msgs_config.shared_parameters import KEYFRAME_BUDGET, KEYFRAME_PERIOD
 
 Progress = Callable[[float], None]
 """Is called with the time in s that is simulated so far, since the first state."""
 
-_KEYFRAME_PERIOD = 0.25  # s: how far before an edit a take may have to begin
+# s that a take may have to begin before an edit; kB/s that suffice for a planner's keyframes then.
+_KEYFRAMES = {KEYFRAME_PERIOD.name: 0.5, KEYFRAME_BUDGET.name: 5_000}
 _Planned = TypeVar("_Planned", bound=Planned)
 
 
@@ -60,12 +61,11 @@ def plan_take(name: str, takes: Takes, parent: Take | None) -> PlannedTake:
         ActuatedCharactersError: names the entry that cannot be simulated, or what is wrong with
             the parent.
     """
-    keyframes = {KEYFRAME_PERIOD.name: _KEYFRAME_PERIOD}
-    run = plan_timeline(name, keyframes, {})
+    run = plan_timeline(name, _KEYFRAMES, {})
     fresh = PlannedTake(run, takes, None, None, 0.0, 0.0, is_as_before=False)
     if parent is None:
         return fresh
-    before = plan_timeline(str(parent.timeline), keyframes, {})
+    before = plan_timeline(str(parent.timeline), _KEYFRAMES, {})
     if not _same_settings(run.plan, before.plan):
         return fresh
     rate = run.plan.simulation.rate_hz

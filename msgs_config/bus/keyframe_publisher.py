@@ -8,9 +8,9 @@ from msgs_config.bus.publishing import Outgoing, has_subscribers
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.keyframe import Keyframe, encode_keyframe
 from msgs_config.messages.topic import Topic
+from msgs_config.shared_parameters import KeyframeSettings
 
-_BYTES_PER_SECOND = 60_000
-"""Of keyframes, in simulated time; the other messages of a humanoid take twenty times that."""
+_BYTES_PER_KB = 1000
 
 
 class KeyframePublisher:
@@ -20,13 +20,20 @@ class KeyframePublisher:
     """
 
     def __init__(
-        self, node: BusNode, topic: Topic, clock: TickClock, period_s: float, *, at_once: bool
+        self,
+        node: BusNode,
+        topic: Topic,
+        clock: TickClock,
+        settings: KeyframeSettings,
+        *,
+        at_once: bool,
     ) -> None:
         """Offer the topic; with a period of 0 there are no keyframes.
 
         A node that goes on from a keyframe publishes one of its first state, `at_once`.
         """
-        self._publisher = node.publisher(topic)
+        period_s = settings.period
+        self._publisher, self._budget = node.publisher(topic), settings.budget
         self._clock, self._period_s, self._at_once = clock, period_s, at_once
         self._ticks = max(round(period_s * clock.rate_hz), 1)
         self._every = 1  # periods from one keyframe to the next, by the size of the last
@@ -42,7 +49,8 @@ class KeyframePublisher:
     def messages(self, stamp_ns: int, session: str, memory: bytes) -> Iterator[Outgoing]:
         """The keyframe of a stamp's state, for which one is due, unless it is too large by now."""
         raw = encode_keyframe(Keyframe(stamp_ns, session, memory))
-        self._every = math.ceil(len(raw) / (self._period_s * _BYTES_PER_SECOND))
+        budget = self._period_s * self._budget * _BYTES_PER_KB
+        self._every = math.ceil(len(raw) / budget)
         if self.is_due(stamp_ns):
             self._at_once = False
             yield self._publisher, raw

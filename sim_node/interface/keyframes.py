@@ -63,7 +63,7 @@ class SimulatorKeyframes:
             node,
             topics.KEYFRAME.of(node.get_name()),
             simulation.clock,
-            settings.period,
+            settings,
             at_once=self._given is not None,
         )
 
