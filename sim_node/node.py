@@ -219,11 +219,12 @@ class SimNode(ComposableNode):
         simulation, characters = self._simulation, self._characters
         self._rate_limiter.tick(time.monotonic())
         pushes = [each.take_pushes() for each in characters]
+        pins = [each.take_pins() for each in characters]
         throws = self._world.take_throws()
         efforts = [each.take_effort() for each in characters]
         simulation.watches_contacts = self._publisher.wants_contacts()
         try:
-            simulation.step(efforts, pushes, throws)
+            simulation.step(efforts, pushes, throws, pins)
         except SimulationError as error:
             self._raise_fault(str(error), diverged=True)
             return

@@ -59,6 +59,32 @@ EXTERNAL_WRENCH = Topic(
         "links' centres of mass; the simulator holds a push for `wrench_duration`"
     ),
 )
+PIN = Topic(
+    "pin",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "any node → sim_node",
+    session=SessionPlace.FRAME_ID_IF_ANY,
+    content=(
+        "points of links to hold to places in the world: `joint_names` = links, translations of "
+        "`transforms` = the places (m, world), linear parts of `twist` (optional) = the points (m, "
+        "link frames; no velocities), else the links' origins, `force.x` of `wrench` = the largest "
+        "force (N), 0 lets go. They hold from the stamp on, with stamp 0 from the next tick on, "
+        "until the next message for the link or the episode's end. A spring yields by 2 cm at the "
+        "largest force, and slips beyond it"
+    ),
+)
+APPLIED_PIN = Topic(
+    "applied_pin",
+    "sensor_msgs/msg/MultiDOFJointState",
+    STREAM,
+    "sim_node → all",
+    session=SessionPlace.FRAME_ID,
+    content=(
+        "the pins that were in force during the previous tick, as in `pin`, in the links' order; "
+        "every tick while there are any. Their forces are the last ones in `applied_wrench`"
+    ),
+)
 APPLIED_WRENCH = Topic(
     "applied_wrench",
     "sensor_msgs/msg/MultiDOFJointState",
@@ -68,7 +94,7 @@ APPLIED_WRENCH = Topic(
     is_of_tick=True,
     content=(
         "the pushes that really acted during the previous tick, as `effort` reports the "
-        "torques; every tick, also when empty"
+        "torques, and behind them the forces of the pins; every tick, also when empty"
     ),
 )
 CONTACTS = Topic(

@@ -10,10 +10,12 @@ from msgs_config.errors import CommandError, LayoutError, MessageError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.joint_state import JointStateDecoder
+from msgs_config.messages.pins import decode_pins
 from msgs_config.messages.session import OwnSession
 from msgs_config.messages.wrenches import decode_wrenches
 from sim_node.interface.publishers import CharacterPublishers
 from sim_node.node_settings import NodeSettings
+from sim_node.physics.pins import Pin, PinQueue
 from sim_node.physics.simulated_character import SimulatedCharacter
 from sim_node.physics.wrenches import ExternalWrench, WrenchQueue
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
@@ -60,6 +62,11 @@ class CharacterInterface:
         self._wrench_messages = StampedSubscription(
             node, self._wrench, f"push{self._of} refused: ", self._add_pushes, logger, own_session
         )
+        self._pins = PinQueue(character.character)
+        self._pin = topics.PIN.under(self.name)
+        self._pin_messages = StampedSubscription(
+            node, self._pin, f"pin{self._of} refused: ", self._add_pins, logger, own_session
+        )
 
     @property
     def missing(self) -> list[str]:
@@ -86,7 +93,9 @@ class CharacterInterface:
         self.commands.clear()
         self.last_effort = self.commands.effort
         self._pushes.clear()
+        self._pins.clear()
         self._wrench_messages.discard()
+        self._pin_messages.discard()
         self._torque_messages.discard()
 
     def take_command(self) -> CommandStatus | None:
@@ -129,16 +138,24 @@ class CharacterInterface:
         self._wrench_messages.take()
         return self._pushes.take(self._clock.tick(self.character.state.stamp_ns))
 
+    def take_pins(self) -> list[Pin]:
+        """The changes of pins from the step on that begins now, with those just sent."""
+        self._pin_messages.take()
+        return self._pins.take(self._clock.tick(self.character.state.stamp_ns))
+
     def report(self) -> dict[str, object]:
-        """Diagnostics: counts of commands, pushes and saturations, and the commands' age."""
+        """Diagnostics: counts of commands, pushes, pins, saturations, and the commands' age."""
         counts, foreign = self.commands.counts, self._own_session.counts
         saturated = self.character.saturated_ticks
         values: dict[str, object] = {status.value: counts[status] for status in CommandStatus}
         values |= {
             "accepted_pushes": self._wrench_messages.accepted,
             "rejected_pushes": self._wrench_messages.rejected,
+            "accepted_pins": self._pin_messages.accepted,
+            "rejected_pins": self._pin_messages.rejected,
             "foreign_commands": foreign[self.torques.name],
             "foreign_pushes": foreign[self._wrench.name],
+            "foreign_pins": foreign[self._pin.name],
             "saturated_ticks": sum(int(ticks) for ticks in saturated),
         }
         names = self.character.character.vector_names
@@ -149,6 +166,17 @@ class CharacterInterface:
             values["command_timeouts"] = self.commands.timeouts
             values["command_age_ms"] = "none" if age_ns is None else round(_MS * age_ns, 3)
         return values
+
+    def _add_pins(self, raw: bytes) -> None:
+        pins = decode_pins(raw)
+        state_ns = self.character.state.stamp_ns
+        self._pins.add(
+            pins.links,
+            pins.places,
+            pins.points,
+            pins.forces,
+            first_tick=first_tick(self._clock, pins.stamp_ns, state_ns),
+        )
 
     def _add_pushes(self, raw: bytes) -> None:
         wrenches = decode_wrenches(raw)

@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.bus.node import BusNode, Publisher, StopFlag
 from msgs_config.bus.publishing import Outgoing, has_subscribers, publish_together
@@ -11,6 +13,7 @@ from msgs_config.character.model import UrdfOptions
 from msgs_config.messages import configuration, topics
 from msgs_config.messages.cdr import encode_header, encode_string, with_stamp
 from msgs_config.messages.joint_state import JointStateEncoder
+from msgs_config.messages.pins import PinArrays, encode_pins
 from msgs_config.messages.probe import DynamicsSample
 from msgs_config.messages.session import episode_text
 from msgs_config.messages.topic import Topic
@@ -66,6 +69,7 @@ class CharacterPublishers:
             _OfTick(create(topics.APPLIED_WRENCH_THROTTLE), self._encode_applied),
             _OfTick(create(topics.JOINT_STATES_THROTTLE), lambda: self._last_state),
         ]
+        self._pins = create(topics.APPLIED_PIN)
         self._sensors = SensorPublishers(node, character, settings)
         self._display = DisplayPublishers(node, character, settings)
 
@@ -126,6 +130,8 @@ class CharacterPublishers:
 
     def before_state(self) -> Iterator[Outgoing]:
         """The messages that a controller may wait for beside a tick's state, which follows them."""
+        if self._character.pins and has_subscribers(self._pins):
+            yield self._pins, self._encode_pins()
         yield from self._messages(self._before_state)
         yield from self._sensors.messages()
 
@@ -173,7 +179,7 @@ class CharacterPublishers:
     def of_ticks(self) -> list[Publisher]:
         """The publishers of what comes again at each tick."""
         return [
-            self._states,
+            *(self._states, self._pins),
             *(each.publisher for each in (*self._before_state, *self._throttled)),
             *(*self._sensors.publishers, *self._display.streams),
         ]
@@ -186,7 +192,7 @@ class CharacterPublishers:
         return self._contacts_encoder.encode(stamp_ns, contacts.wrenches, contacts.touching)
 
     def _encode_applied(self) -> bytes:
-        """The pushes that acted during the tick."""
+        """The pushes that acted during the tick, pins' forces among them."""
         pushes, stamp_ns = self._character.pushes, self._character.state.stamp_ns
         if not pushes:
             return with_stamp(self._no_wrenches, stamp_ns)
@@ -196,6 +202,20 @@ class CharacterPublishers:
                 [self._links[push.link] for push in pushes],
                 [push.wrench for push in pushes],
                 [push.point for push in pushes],
+                self._session,
+            )
+        )
+
+    def _encode_pins(self) -> bytes:
+        """The pins in force during the tick."""
+        pins = self._character.pins
+        return encode_pins(
+            PinArrays(
+                self._character.state.stamp_ns,
+                tuple(self._links[pin.link] for pin in pins),
+                np.array([pin.place for pin in pins]),
+                np.array([pin.point for pin in pins]),
+                np.array([pin.force for pin in pins]),
                 self._session,
             )
         )

@@ -14,6 +14,8 @@ from msgs_config.messages.state import StampedState
 from sim_node.initial_state import check_length
 from sim_node.physics.engine import Balls, Body
 from sim_node.physics.passive_forces import PassiveForces
+from sim_node.physics.pin_forces import PinForces
+from sim_node.physics.pins import Pin, changed_pins
 from sim_node.physics.short_links import speed_bounds
 from sim_node.physics.wrenches import ExternalWrench
 
@@ -55,6 +57,7 @@ class CharacterSnapshot:
     delayed: tuple[FloatArray, ...]  # (n,) each, commands on their way
     saturated_ticks: IntArray  # (b,)
     start: tuple[FloatArray, FloatArray]  # (n,) each, position and velocity of later episodes
+    pins: tuple[Pin, ...] = ()
 
 
 class SimulatedCharacter:
@@ -62,15 +65,22 @@ class SimulatedCharacter:
 
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
-    pushes: tuple[ExternalWrench, ...]  # those that acted during the last tick
+    pushes: tuple[ExternalWrench, ...]  # those that acted during the last tick, pins' forces last
+    pins: tuple[Pin, ...]  # those in force during the last tick
     balls: Balls  # the balls of its world
     speed_bounds: dict[bool, float]
     """Of every degree of freedom in the engine, rad/s or m/s; by whether there is a ground."""
 
     def __init__(
-        self, setup: CharacterSetup, *, delay_ticks: int, step_s: float, speed_limit: float
+        self,
+        setup: CharacterSetup,
+        *,
+        delay_ticks: int,
+        step_s: float,
+        substeps: int,
+        speed_limit: float,
     ) -> None:
-        """Check the setup, for efforts that come late by some ticks and engine steps of `step_s`.
+        """Check the setup, for efforts that come late by some ticks of engine steps of `step_s`.
 
         A speed beyond the limit, in rad/s or m/s, counts as divergence.
 
@@ -90,7 +100,8 @@ class SimulatedCharacter:
             self._initial("initial_position", setup.initial_position),
             self._initial("initial_velocity", setup.initial_velocity),
         )
-        self._step_s = step_s
+        self._step_s, self._period = step_s, step_s * substeps
+        self._pin_forces: PinForces | None = None  # None: there was no pin yet
         self._delay_ticks = delay_ticks
         self.speed_bounds = speed_bounds(setup.character, step_s, speed_limit)
         # (2, n) largest position and velocity of a sound state
@@ -115,22 +126,35 @@ class SimulatedCharacter:
         body.set_state(self._position, self._velocity)
         self._contacts: Contacts | None = self._no_contacts
         self._contacts_are_due = False  # the engine has them, and they were not asked for yet
-        self.pushes = ()
+        self.pushes, self.pins = (), ()
         self.before = None
         self._read(stamp_ns, effort=None)
 
     def begin_tick(
         self, effort: FloatArray, pushes: Sequence[ExternalWrench], watches_contacts: bool
     ) -> None:
-        """Take the effort (n,) and the pushes of a tick."""
+        """Take the effort (n,) and the pushes of a tick; the pins' forces are added to these."""
         self._delayed.append(effort + 0.0)  # -0.0 becomes 0.0: a tick has one effort, to the bit
         wanted = self._delayed.popleft()
         self._applied = self._limits.clipped(wanted)
         if self._applied is not wanted:
             self.saturated_ticks += self.layout.norms(wanted) > self._limits.values
-        self.pushes = tuple(pushes)
+        self.pushes = (*pushes, *self._find_pin_forces())
         self._contacts = self._no_contacts if watches_contacts else None
         self._contacts_are_due = False
+
+    def change_pins(self, changes: Sequence[Pin]) -> None:
+        """Hold and let go points of links from the coming tick on."""
+        if changes:
+            self.pins = changed_pins(self.pins, changes)
+
+    def _find_pin_forces(self) -> tuple[ExternalWrench, ...]:
+        """The forces of the pins during the tick that begins."""
+        if not self.pins:
+            return ()
+        if self._pin_forces is None:
+            self._pin_forces = PinForces(self.character, self._period)
+        return self._pin_forces.wrenches(self.pins, self.state.position, self.state.velocity)
 
     def begin_substep(self, first: bool) -> None:
         """Apply all forces again for one engine step."""
@@ -194,13 +218,14 @@ class SimulatedCharacter:
             tuple(self._delayed),
             self.saturated_ticks.copy(),
             (self._position, self._velocity),
+            self.pins,
         )
 
     def restore(self, snapshot: CharacterSnapshot) -> None:
         """Restore a snapshot; the engine's state is restored by the simulation."""
         self.state, self.before = snapshot.state, snapshot.before
         self._contacts, self._contacts_are_due = snapshot.contacts, False
-        self.pushes = snapshot.pushes
+        self.pushes, self.pins = snapshot.pushes, snapshot.pins
         self._delayed = deque(snapshot.delayed)
         self.saturated_ticks = snapshot.saturated_ticks.copy()
         self._position, self._velocity = snapshot.start

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Any
 
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ClosedError, SimulationError
@@ -10,6 +11,7 @@ from msgs_config.messages.clock import FIRST_TICK, TickClock
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.engine import World, make_world
+from sim_node.physics.pins import Pin
 from sim_node.physics.settings import SimulationSettings, WorldSettings
 from sim_node.physics.simulated_character import (
     CharacterSetup,
@@ -60,6 +62,7 @@ class Simulation:
                 setup,
                 delay_ticks=settings.command_delay_ticks,
                 step_s=settings.world.step_s,
+                substeps=settings.substeps,
                 speed_limit=settings.speed_limit,
             )
             for setup in setups
@@ -122,10 +125,12 @@ class Simulation:
         efforts: Sequence[FloatArray],
         pushes: Sequence[Sequence[ExternalWrench]] | None = None,
         throws: Sequence[ProjectileThrow] = (),
+        pins: Sequence[Sequence[Pin]] | None = None,
     ) -> None:
         """Advance one tick: each character's effort (n,), clipped to its limits, and its pushes.
 
-        Throws are let go first.
+        Throws are let go first. Of each character, `pins` are those that are others from this tick
+        on: they hold until they are changed again, or the episode ends.
 
         Raises:
             SimulationError: a next state is not finite or faster than the speed limit; it names
@@ -133,8 +138,10 @@ class Simulation:
             ClosedError: the simulation is closed.
         """
         self.check_open()
-        pushes = pushes or [()] * len(self.characters)
-        for character, effort, own in zip(self.characters, efforts, pushes, strict=True):
+        nothing: Sequence[Sequence[Any]] = [()] * len(self.characters)
+        given = zip(self.characters, efforts, pushes or nothing, pins or nothing, strict=True)
+        for character, effort, own, changes in given:
+            character.change_pins(changes)
             character.begin_tick(effort, own, self.watches_contacts)
         self._move_balls(throws)
         substeps = self.settings.substeps

@@ -47,6 +47,7 @@ class MujocoBatch:
             setup.character,
             delay_ticks=settings.command_delay_ticks,
             step_s=settings.world.step_s,
+            substeps=settings.substeps,
             speed_limit=settings.speed_limit,
         )
         self._speed_bound = one.speed_bounds[settings.world.ground]
