@@ -22,6 +22,7 @@ from msgs_config.messages.clock import TickClock
 from msgs_config.messages.configuration import FILES, SINCE
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.keyframe import decode_keyframe
+from msgs_config.messages.pins import PinArrays, decode_pins
 from msgs_config.messages.session import ANONYMOUS, read_session
 from msgs_config.messages.wrenches import WrenchArrays, decode_wrenches
 from msgs_config.shared_parameters import RATE
@@ -90,11 +91,12 @@ class CharacterTimeline:
         self.states, self.references = States(), States()
         self.contacts: dict[int, WrenchArrays] = {}  # by stamp
         self.applied: dict[int, WrenchArrays] = {}  # by stamp, the pushes that acted
+        self.pins: dict[int, PinArrays] = {}  # by stamp, those in force
         self.commands: dict[int, list[CommandArrays]] = {}  # by stamp
         self.controller: list[NodeParameters] = []
         self.modes: list[ModeChange] = []
         self.plans: dict[int, PlanArrays] = {}  # by stamp
-        self.pushes_sent = 0
+        self.pushes_sent = self.pins_sent = 0
         # states before the first one of an episode: stamp, message, when it was published
         self._amid: list[tuple[int, bytes, int]] = []
         self.begins_amid = False  # its first state is in the middle of an episode
@@ -215,6 +217,13 @@ class CharacterTimeline:
     def _take_push(self, raw: bytes, published_ns: int) -> None:
         self.pushes_sent += 1
 
+    def _take_pin(self, raw: bytes, published_ns: int) -> None:
+        self.pins_sent += 1
+
+    def _take_applied_pins(self, raw: bytes, published_ns: int) -> None:
+        pins = decode_pins(raw)
+        self.pins[pins.stamp_ns] = pins
+
     def _take_contacts(self, raw: bytes, published_ns: int) -> None:
         contacts = decode_wrenches(raw)
         self.contacts[contacts.stamp_ns] = contacts
@@ -274,6 +283,8 @@ class CharacterTimeline:
         topics.JOINT_TORQUES.name: _take_command,
         topics.EXTERNAL_WRENCH.name: _take_push,
         topics.APPLIED_WRENCH.name: _take_applied,
+        topics.PIN.name: _take_pin,
+        topics.APPLIED_PIN.name: _take_applied_pins,
         topics.CONTACTS.name: _take_contacts,
         _REFERENCE: _take_reference,
         _CONTROLLER: _take_controller,

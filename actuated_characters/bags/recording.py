@@ -29,6 +29,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import RecordingError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.pins import PinArrays
 from msgs_config.messages.projectiles import BallStates
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.messages.wrenches import WrenchArrays
@@ -71,13 +72,17 @@ class Recording:
     reference_position: FloatArray  # (t + 1, n), NaN where there was none
     reference_velocity: FloatArray  # (t + 1, n)
     contacts: Wrenches  # (t,): those in each tick, None where no message came; () if never
-    applied_wrench: Wrenches  # (t,): pushes in each tick, None where no message came; () if never
+    # (t,): pushes in each tick, then the pins' forces; None where no message came; () if never
+    applied_wrench: Wrenches
     commands: tuple[tuple[CommandArrays, ...], ...]  # (t + 1,): the answers to each state, in order
     controller: tuple[NodeParameters, ...] = ()  # the controller's parameters, set after set
     modes: tuple[ModeChange, ...] = ()  # the controller's changes of mode, in order
     plans: tuple[PlanArrays, ...] = ()  # the plans of a planner, in order
     unstamped_commands: tuple[CommandArrays, ...] = ()  # commands of real time that answer no state
     pushes_sent: int = 0  # messages on `external_wrench`
+    # (t + 1,): pins in force in the tick before each state; () if there were none
+    pins: tuple[PinArrays | None, ...] = ()
+    pins_sent: int = 0  # messages on `pin`
     # (t,): throws that each tick began with; () if there were none
     throws: tuple[tuple[ProjectileThrow, ...], ...] = ()
     balls: tuple[BallStates | None, ...] = ()  # (t + 1,): where the balls are; () if there are none
@@ -123,7 +128,7 @@ class Recording:
         ticks = slice(rows.start, rows.stop - 1)
         by_state = (
             *("stamps_ns", "published_ns", "position", "velocity", "balls", "commands"),
-            *("reference_position", "reference_velocity"),
+            *("reference_position", "reference_velocity", "pins"),
         )
         by_tick = ("effort", "contacts", "applied_wrench", "throws")
         cut = {name: getattr(self, name)[rows] for name in by_state}
@@ -279,6 +284,8 @@ def _make_recording(timeline: CharacterTimeline, worlds: Mapping[str, WorldTimel
         plans=tuple(plans[stamp] for stamp in sorted(plans.keys() & set(stamp_list))),
         unstamped_commands=tuple(timeline.commands.get(0, ())),
         pushes_sent=timeline.pushes_sent,
+        pins=_at(stamp_list, timeline.pins, None),
+        pins_sent=timeline.pins_sent,
         throws=_at(ends, world.throws, ()),
         balls=_at(stamp_list, world.balls, None),
         throws_sent=world.throws_sent,

@@ -20,6 +20,7 @@ _ITEMS = (  # of what there may be none at all: the name, one of nothing, and ho
     ("applied_wrench", None, 0),
     ("throws", (), 0),
     ("balls", None, 1),
+    ("pins", None, 1),
 )
 
 

@@ -8,6 +8,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+from actuated_characters.bags.pins import own_pushes, pin_changes
 from actuated_characters.bags.recording import Recording
 from actuated_characters.replay.players.controller_parameters import (
     parameter_changes,
@@ -16,9 +17,10 @@ from actuated_characters.replay.players.controller_parameters import (
 from actuated_characters.replay.world import (
     check_pushes,
     check_throws,
-    make_pushes,
     simulator_values,
+    wrenches_of,
 )
+from actuated_characters.runs.planned.pins import PlannedPin, planned_pins
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush
@@ -36,6 +38,7 @@ class Stop:
 
     settings: list[tuple[str, dict[str, Any]]] = field(default_factory=list)  # by node, in order
     pushes: list[PlannedPush] = field(default_factory=list)
+    pins: list[PlannedPin] = field(default_factory=list)
     throws: list[PlannedThrow] = field(default_factory=list)
     strengths: list[PlannedStrengths] = field(default_factory=list)
     resets: bool = False  # the state of the row begins an episode
@@ -58,16 +61,17 @@ class ForkPoint:
 
 
 def recorded_stops(recording: Recording, point: ForkPoint) -> Stops:
-    """The recorded parameters, pushes, throws and resets that a fork repeats.
+    """The recorded parameters, pushes, pins, throws and resets that a fork repeats.
 
-    A push or throw is sent in the first state of its episode, because a reset discards those that
-    wait; and it begins where it began.
+    A push, pin or throw is sent in the first state of its episode, because a reset discards those
+    that wait; and it begins where it began.
 
     Raises:
-        RecordingError: the recording does not say which pushes or throws acted, or a push was not
-            held for `wrench_duration`.
+        RecordingError: the recording does not say which pushes, pins or throws acted, or a push was
+            not held for `wrench_duration`.
     """
     check_pushes(recording)
+    _check_pins(recording)
     check_throws(recording)
     stops: Stops = defaultdict(Stop)
     for row, changes in parameter_changes(recording).items():
@@ -82,16 +86,37 @@ def recorded_stops(recording: Recording, point: ForkPoint) -> Stops:
     ends = [*(row - 1 for row in begins[1:]), len(recording.effort)]  # a reset is a tick
     for first, end in zip(begins, ends, strict=True):
         pushes = [each for each in begun_pushes(recording, first, end) if point.repeats(each[0])]
+        pins = _changed_pins(recording, first, end, point)
         throws = _begun_throws(recording, first, end, point)
         if len(pushes) > _MOST_PUSHES:
             raise RecordingError(
                 f"the recording has {len(pushes)} pushes in one episode; a fork repeats at most "
                 f"{_MOST_PUSHES}"
             )
-        if pushes or throws:
+        if pushes or pins or throws:
             stops[first + 1].pushes += [push for _, push in pushes]
+            stops[first + 1].pins += pins
             stops[first + 1].throws += throws
     return stops
+
+
+def _check_pins(recording: Recording) -> None:
+    """Raise RecordingError if there were pins, and the recording does not have which acted."""
+    if recording.pins_sent and not recording.pins:
+        raise RecordingError(
+            f"the recording has {recording.pins_sent} messages on '{topics.PIN.name}', but not "
+            f"which pins were in force: nothing on '{topics.APPLIED_PIN.name}'"
+        )
+
+
+def _changed_pins(recording: Recording, first: int, end: int, point: ForkPoint) -> list[PlannedPin]:
+    """The repeated changes of pins of some ticks, in their order."""
+    return [
+        pin
+        for row in range(first, end)
+        if point.repeats(row) and (changes := pin_changes(recording, row)) is not None
+        for pin in planned_pins(changes)
+    ]
 
 
 def _begun_throws(
@@ -120,7 +145,7 @@ def begun_pushes(recording: Recording, first: int, end: int) -> list[tuple[int, 
     for row in range(first, end):
         going_on = [push for push in acting if row < push.first_tick + settings.push_ticks]
         acting = []
-        for found in make_pushes(recording, row, row):
+        for found in wrenches_of(recording, own_pushes(recording, row), row):
             if going_on and _key(found) == _key(going_on[0]):
                 acting.append(going_on.pop(0))
                 continue

@@ -27,6 +27,7 @@ from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
 from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.pins import read_pins
 from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.wrenches import read_pushes
@@ -35,6 +36,7 @@ from msgs_config.bus.node import BusNode, Publisher, Subscription, declared_sett
 from msgs_config.errors import ReplayError
 from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
+from msgs_config.messages.pins import encode_pins
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
@@ -60,9 +62,11 @@ class ForkSettings(Settings):
     settings: str = parameter("{}", "new parameters of nodes from that state on, JSON by node")
     file: str = parameter("pushes.json", "new pushes, as a run writes them")
     throws: str = parameter("throws.json", "new throws, as a run writes them")
+    pins: str = parameter("", "new pins, as a run writes them; empty: none")
     strengths: str = parameter("", "new strengths, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
     throw_subscribers: int = parameter(1, "likewise to throw")
+    pin_subscribers: int = parameter(1, "likewise to pin")
     strength_subscribers: int = parameter(1, "likewise to controller_node/strength")
     session: GivenSession = GivenSession()
 
@@ -108,6 +112,8 @@ class ForkNode(Player):
         pushed, thrown = settings.wait_for_subscribers, settings.throw_subscribers
         requested = {name for each in self._requests.values() for name, _ in each}
         sent = [(topics.EXTERNAL_WRENCH, pushed), (topics.THROW, thrown)]
+        if any(stop.pins for stop in self._stops.values()):
+            sent.append((topics.PIN, settings.pin_subscribers))
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         if settings.strengths:
             sent.append((_STRENGTH, settings.strength_subscribers))
@@ -190,6 +196,8 @@ class ForkNode(Player):
         for push in stop.pushes:
             content = replace(push.arrays(), frame_id=self._session)
             messages.append((topics.EXTERNAL_WRENCH.name, encode_wrenches(content)))
+        for pin in stop.pins:
+            messages.append((topics.PIN.name, encode_pins(pin.arrays(self._session))))
         for throw in stop.throws:
             raw = self._throw_codec.encode(throw.stamp_ns, throw.throw)
             messages.append((topics.THROW.name, raw))
@@ -270,5 +278,7 @@ class ForkNode(Player):
             stops[row].strengths += read_strengths(Path(settings.strengths))
         for push in read_pushes(Path(settings.file)):
             stop_of(push).pushes.append(push)
+        for pin in read_pins(Path(settings.pins)) if settings.pins else ():
+            stop_of(pin).pins.append(pin)
         for throw in read_throws(Path(settings.throws)):
             stop_of(throw).throws.append(throw)

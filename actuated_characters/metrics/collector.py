@@ -26,6 +26,7 @@ COUNTS = {  # counts in the simulator's diagnostics, and their names as figures
     "duplicate": "duplicate_commands",
     "rejected_pushes": "rejected_pushes",
     "rejected_throws": "rejected_throws",
+    "rejected_pins": "rejected_pins",
 }
 HEARD = frozenset(
     topic.name for each in topics.TABLE if each.is_measured for topic in each.as_others_name_it

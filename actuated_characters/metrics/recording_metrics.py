@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuated_characters.bags.pins import own_pushes
 from actuated_characters.bags.recording import Recording, Wrenches
 from actuated_characters.metrics.error_measures import (
     AT_LIMIT,
@@ -72,8 +73,8 @@ def saturated_shares(shares: FloatArray) -> FloatArray:
 def push_spans(recording: Recording) -> list[PushSpan]:
     """The pushes that acted: one for each sequence of ticks in which a link was pushed."""
     forces: dict[str, dict[int, FloatArray]] = {}  # N, by link and tick
-    for tick, wrenches in enumerate(recording.applied_wrench):
-        if wrenches is not None:
+    for tick in range(len(recording.applied_wrench)):
+        if (wrenches := own_pushes(recording, tick)) is not None:
             for link, wrench in zip(wrenches.links, wrenches.wrenches, strict=True):
                 by_tick = forces.setdefault(link, {})
                 by_tick[tick] = by_tick.get(tick, np.zeros(3)) + wrench[:3]

@@ -24,7 +24,7 @@ _RADIUS = 0.1  # m, of a ball whose radius was not recorded
 _SHORTEST_ARROW = 0.25  # length of the shortest arrow, as a share of the longest one's
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
-    *("reference_position", "reference_velocity", "balls", "commands"),
+    *("reference_position", "reference_velocity", "balls", "pins", "commands"),
 )
 _OF_TICKS = ("effort", "contacts", "applied_wrench", "throws")
 

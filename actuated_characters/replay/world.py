@@ -10,9 +10,11 @@ import numpy as np
 from actuated_characters.bags.recording import Recording, read_recordings
 from actuated_characters.replay.comparison import clock_of
 from msgs_config.errors import ActuatedCharactersError, RecordingError, one_of
+from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.keyframe import decode_keyframe
 from msgs_config.messages.state import StampedState
+from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.parameters import Values
 from msgs_config.versions import describe_changes, installed_versions
 from sim_node.initial_state import changed_start
@@ -117,15 +119,20 @@ def check_pushes(recording: Recording) -> list[str]:
     Raises:
         RecordingError: there were pushes, and it does not have all that acted.
     """
-    of = of_character(recording)
+    of, sent = of_character(recording), recording.pushes_sent + recording.pins_sent
     if not recording.applied_wrench:
-        if recording.pushes_sent:
+        if sent:
+            what, topic = (
+                ("pushes", topics.EXTERNAL_WRENCH)
+                if recording.pushes_sent
+                else ("pins", topics.PIN)
+            )
             raise RecordingError(
-                f"the recording has pushes{of} ({recording.pushes_sent} messages on "
-                "'external_wrench'), but not which of them acted: nothing on 'applied_wrench'"
+                f"the recording has {what}{of} ({recording.pushes_sent or sent} messages on "
+                f"'{topic.name}'), but not which of them acted: nothing on 'applied_wrench'"
             )
         return [f"the recording has no 'applied_wrench'{of}: replayed without pushes"]
-    if recording.pushes_sent and None in recording.applied_wrench:
+    if sent and None in recording.applied_wrench:
         gaps = [row for row, pushes in enumerate(recording.applied_wrench) if pushes is None]
         raise RecordingError(
             f"the recording lacks which pushes acted{of} in {len(gaps)} ticks, the first "
@@ -181,8 +188,8 @@ def make_simulation(together: Sequence[Recording], first_stamp_ns: int) -> Simul
 
 
 def _of_applied(snapshot: Snapshot, settings: SimulationSettings) -> Snapshot:
-    """A state for efforts as really applied: none is on its way."""
-    characters = tuple(replace(each, delayed=()) for each in snapshot.characters)
+    """A state for efforts and forces as really applied: no effort is on its way, no pin acts."""
+    characters = tuple(replace(each, delayed=(), pins=()) for each in snapshot.characters)
     return replace(snapshot, settings=settings, characters=characters)
 
 
@@ -206,12 +213,25 @@ def _unlimited(setup: CharacterSetup) -> CharacterSetup:
 
 
 def make_pushes(recording: Recording, row: int, tick: int) -> list[ExternalWrench]:
-    """The pushes that acted during the tick of a row, which begins at `tick`, in their order.
+    """The pushes and the pins' forces that acted in the tick of a row, which begins at `tick`.
+
+    They are in the order of the simulator's sums.
 
     Raises:
         RecordingError: a link does not exist.
     """
     applied = recording.applied_wrench[row] if recording.applied_wrench else None
+    return wrenches_of(recording, applied, tick)
+
+
+def wrenches_of(
+    recording: Recording, applied: WrenchArrays | None, tick: int
+) -> list[ExternalWrench]:
+    """Wrenches that a recording has of the tick that begins at `tick`, for that tick alone.
+
+    Raises:
+        RecordingError: a link does not exist.
+    """
     if applied is None or not applied.links:
         return []
     links = recording.character.links

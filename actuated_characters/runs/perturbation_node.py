@@ -1,9 +1,10 @@
-"""`pusher`: sends pushes, throws, velocities and strengths that were planned before a run."""
+"""`pusher`: sends pushes, throws, velocities, strengths and pins, planned before a run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from actuated_characters.runs.planned.pins import read_pins
 from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.throws import read_throws
 from actuated_characters.runs.planned.velocities import read_velocities
@@ -11,6 +12,7 @@ from actuated_characters.runs.planned.wrenches import read_pushes
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.node import BusNode, Executor, StopFlag, declared_settings
 from msgs_config.messages import topics
+from msgs_config.messages.pins import encode_pins
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import GivenSession
 from msgs_config.messages.topic import Topic
@@ -25,12 +27,14 @@ class PerturbationSettings(Settings):
     throws: str = parameter("", "the throws, as a run writes them; empty: none")
     velocities: str = parameter("", "the velocities, as a run writes them; empty: none")
     strengths: str = parameter("", "the strengths, as a run writes them; empty: none")
+    pins: str = parameter("", "the pins, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(
         1, "send when this many subscribe to external_wrench", maximum=1000
     )
     throw_subscribers: int = parameter(1, "likewise to throw", maximum=1000)
     velocity_subscribers: int = parameter(1, "likewise to cmd_vel_stamped", maximum=1000)
     strength_subscribers: int = parameter(1, "likewise to controller_node/strength", maximum=1000)
+    pin_subscribers: int = parameter(1, "likewise to pin", maximum=1000)
     session: GivenSession = GivenSession()
 
 
@@ -44,7 +48,7 @@ class PerturbationNode(ComposableNode):
     """
 
     def __init__(self, node: BusNode | None = None) -> None:
-        """Read the pushes, the throws, the velocities and the strengths.
+        """Read the pushes, the throws, the velocities, the strengths and the pins.
 
         Without a place on a bus it is a node of ROS.
 
@@ -91,6 +95,17 @@ class PerturbationNode(ComposableNode):
                     topics.STRENGTH.of(topics.CONTROLLER_NODE),
                     [each.encode() for each in strengths],
                     settings.strength_subscribers,
+                )
+            )
+
+        if settings.pins:
+            pins = read_pins(Path(settings.pins))
+            self._outgoing.append(
+                _PlannedPublisher(
+                    self.node,
+                    topics.PIN,
+                    [encode_pins(each.arrays(session)) for each in pins],
+                    settings.pin_subscribers,
                 )
             )
 

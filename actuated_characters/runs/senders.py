@@ -42,14 +42,16 @@ def _write_planned(
     files = {what: directory / PARAMETERS / f"{what}.json" for what in by_name}
     for what, planned in by_name.items():
         write_planned(files[what], planned)
-    steers, weakens = bool(inputs.velocities), bool(inputs.strengths)
+    steers, weakens, holds = bool(inputs.velocities), bool(inputs.strengths), bool(inputs.pins)
     return {
         "file": str(files["pushes"]),
         "throws": str(files["throws"]),
         **({"velocities": str(files["velocities"])} if steers else {}),
         **({"strengths": str(files["strengths"])} if weakens else {}),
+        **({"pins": str(files["pins"])} if holds else {}),
         "wait_for_subscribers": subscribers("external_wrench"),
         "throw_subscribers": subscribers("throw"),
+        "pin_subscribers": subscribers("pin"),
         **({"velocity_subscribers": subscribers("cmd_vel_stamped")} if steers else {}),
         **({"strength_subscribers": subscribers("controller_node/strength")} if weakens else {}),
     }
@@ -63,7 +65,7 @@ def check_recorded(directory: Path, ticks: int, inputs: PlannedInputs | None) ->
     recorded, _ = read_metrics(directory)
     if recorded["ticks"] != ticks:
         raise RunError(f"{recorded['ticks']} of {ticks} ticks were recorded")
-    for what in ("pushes", "throws"):
+    for what in ("pushes", "throws", "pins"):
         sent = None if inputs is None else len(inputs.by_name()[what])
         if sent != 0 and (rejected := recorded[f"rejected_{what}"]):
             of = "" if sent is None else f"of {sent} "

@@ -203,6 +203,7 @@ def _fork(line: Sequence[Take], first: int, run: TimelineRun) -> ForkPlan:
         later(run.inputs.pushes),
         later(run.inputs.throws),
         strengths=later(_overriding(line, run.inputs.strengths)),
+        pins=later(run.inputs.pins),
     )
     return replace(fork, inputs=inputs)
 

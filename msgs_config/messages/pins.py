@@ -6,8 +6,9 @@ and no velocities; without them the links' origins are held. `force.x` of `wrenc
 force, N; 0 lets go. Everything else in the message is unused.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,6 +23,11 @@ from msgs_config.messages.cdr import (
     with_stamp,
 )
 
+PinRow: TypeAlias = tuple[float, ...]
+"""Place (3) m, world; point (3) m, link frame; largest force, N."""
+
+LET_GO: PinRow = (0.0,) * 7
+
 
 @dataclass(frozen=True)
 class PinArrays:
@@ -34,22 +40,20 @@ class PinArrays:
     forces: FloatArray  # (m,) N, the largest; 0 lets go
     frame_id: str = WORLD  # the frame, or the session that sent them
 
-    def select(self, links: Sequence[str]) -> "PinArrays":
-        """Those of some of its links; it has places and points."""
-        rows = [self.links.index(link) for link in links]
-        kept = self.places[rows], self.points[rows], self.forces[rows]
-        return PinArrays(self.stamp_ns, tuple(links), *kept, self.frame_id)
+    @classmethod
+    def of_rows(
+        cls, stamp_ns: int, rows: Mapping[str, PinRow], frame_id: str = WORLD
+    ) -> "PinArrays":
+        """From what is said of each link."""
+        numbers = np.array(list(rows.values()), dtype=float).reshape(-1, len(LET_GO))
+        places, points, forces = numbers[:, :3], numbers[:, 3:6], numbers[:, 6]
+        return cls(stamp_ns, tuple(rows), places, points, forces, frame_id)
 
-    def row(self, link: str) -> bytes:
-        """All that it says of a link; it has places and points."""
-        number = self.links.index(link)
-        return b"".join(each[number].tobytes() for each in (self.places, self.points, self.forces))
-
-
-def let_go(stamp_ns: int, links: Sequence[str], frame_id: str = WORLD) -> PinArrays:
-    """Pins that let links go."""
-    nowhere = np.zeros((len(links), 3))
-    return PinArrays(stamp_ns, tuple(links), nowhere, nowhere, np.zeros(len(links)), frame_id)
+    @property
+    def rows(self) -> dict[str, PinRow]:
+        """What is said of each link, in the sender's order; there have to be places and points."""
+        numbers = np.column_stack((self.places, self.points, self.forces)).tolist()
+        return {link: tuple(row) for link, row in zip(self.links, numbers, strict=True)}
 
 
 def encode_pins(pins: PinArrays) -> bytes:

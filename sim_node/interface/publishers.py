@@ -4,8 +4,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, Turns
 from msgs_config.bus.node import BusNode, Publisher, StopFlag
 from msgs_config.bus.publishing import Outgoing, has_subscribers, publish_together
@@ -208,17 +206,11 @@ class CharacterPublishers:
 
     def _encode_pins(self) -> bytes:
         """The pins in force during the tick."""
-        pins = self._character.pins
-        return encode_pins(
-            PinArrays(
-                self._character.state.stamp_ns,
-                tuple(self._links[pin.link] for pin in pins),
-                np.array([pin.place for pin in pins]),
-                np.array([pin.point for pin in pins]),
-                np.array([pin.force for pin in pins]),
-                self._session,
-            )
-        )
+        rows = {
+            self._links[pin.link]: (*pin.place, *pin.point, pin.force)
+            for pin in self._character.pins
+        }
+        return encode_pins(PinArrays.of_rows(self._character.state.stamp_ns, rows, self._session))
 
 
 def wait_for_subscribers(

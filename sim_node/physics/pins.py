@@ -58,8 +58,8 @@ class PinQueue:
             CommandError: a link does not exist, a length or a number is wrong, or too many wait.
         """
         self._check(names, places, points, forces)
-        places, points = (
-            each if len(each) else np.zeros((len(names), 3)) for each in (places, points)
+        places, points = (  # -0.0 becomes 0.0: what is reported says all that acts, to the bit
+            each + 0.0 if len(each) else np.zeros((len(names), 3)) for each in (places, points)
         )
         rows = zip(names, places.tolist(), points.tolist(), forces.tolist(), strict=True)
         self._waiting += [

@@ -99,6 +99,7 @@ def _run_of_timeline(
         [*run.inputs.pushes, *_pushes(options.push, run.plan, None)],
         [*run.inputs.throws, *throws],
         strengths=run.inputs.strengths,
+        pins=run.inputs.pins,
     )
     return PlannedRun(run.plan, inputs, [*run.warnings, *in_the_way])
 

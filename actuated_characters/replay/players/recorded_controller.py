@@ -25,6 +25,7 @@ from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder, state_in_layout
+from msgs_config.messages.pins import encode_pins
 from msgs_config.messages.projectiles import ThrowCodec
 from msgs_config.messages.session import GivenSession, read_session
 from msgs_config.messages.state import StampedState
@@ -79,7 +80,7 @@ class RecordedController(Player):
         try:
             yield from self.wait(
                 self._is_subscribed,
-                lambda: "sim_node to listen to torques, pushes, throws and resets",
+                lambda: "sim_node to listen to torques, pushes, pins, throws and resets",
             )
             while not self.stop and self._played <= self._ticks:
                 yield from self.wait(
@@ -117,6 +118,7 @@ class RecordedController(Player):
         self._throw(tick)
         for each in self._characters:
             each.push(tick)
+            each.pin(tick)
         for each in self._characters:
             each.command(tick)
 
@@ -169,7 +171,8 @@ class _CharacterTopics:
         self._encoder = lru_cache(maxsize=16)(lambda names: JointStateEncoder(names, session))
         self._torques = node.publisher(topics.JOINT_TORQUES.under(name))
         self._wrenches = node.publisher(topics.EXTERNAL_WRENCH.under(name))
-        self.publishers = self._torques, self._wrenches
+        self._pins = node.publisher(topics.PIN.under(name))
+        self.publishers = self._torques, self._wrenches, self._pins
         self._subscription = node.subscription(topics.JOINT_STATES.under(name))
 
     def receive(self) -> bool:
@@ -211,6 +214,19 @@ class _CharacterTopics:
             own = replace(push, stamp_ns=stamp_ns, frame_id=self._session)
             self._wrenches.publish(encode_wrenches(own))
             Player.acknowledge(self._wrenches, f"the push of tick {self._first_tick + tick}")
+
+    def pin(self, tick: int) -> None:
+        """Send what changed the pins as a tick began; returns when the simulator has it.
+
+        Raises:
+            RunError: it does not acknowledge the message.
+        """
+        pins = self._inputs.pins[tick]
+        if pins is not None:
+            stamp_ns = self._clock.stamp_ns(self._first_tick + tick)
+            own = replace(pins, stamp_ns=stamp_ns, frame_id=self._session)
+            self._pins.publish(encode_pins(own))
+            Player.acknowledge(self._pins, f"the pins of tick {self._first_tick + tick}")
 
     def command(self, tick: int) -> None:
         """Send what was commanded in a tick."""

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuated_characters.bags.pins import own_pushes, pin_changes
 from actuated_characters.bags.recording import CommandArrays, Recording
 from actuated_characters.replay.world import check_pushes
 from msgs_config.errors import CommandError, LayoutError, RecordingError
+from msgs_config.messages.pins import PinArrays
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.timing.lockstep import CommandStatus, LockstepBarrier
 
@@ -20,6 +22,7 @@ class SimulatorInputs:
 
     commands: tuple[Commands, ...]  # (t,): the messages that answer each state, in order
     pushes: tuple[WrenchArrays | None, ...]  # (t,): what acts during each tick, if anything
+    pins: tuple[PinArrays | None, ...]  # (t,): what changes the pins as each tick begins
     resets: frozenset[int]  # ticks (counted from 0) that were resets
     are_applied: bool  # the commands are the efforts that were applied, clipped and delayed
 
@@ -44,9 +47,14 @@ def make_inputs(together: Sequence[Recording]) -> list[SimulatorInputs]:
             for tick, each in enumerate(found)
         ]
         check_pushes(recording)
-        pushes = recording.applied_wrench or (None,) * len(found)
+        pushes = [own_pushes(recording, tick) for tick in range(len(found))]
         acting = [push if push is not None and push.links else None for push in pushes]
-        inputs.append(SimulatorInputs(tuple(commands), tuple(acting), resets, are_applied))
+        pins = [
+            None if tick in resets else pin_changes(recording, tick) for tick in range(len(found))
+        ]
+        inputs.append(
+            SimulatorInputs(tuple(commands), tuple(acting), tuple(pins), resets, are_applied)
+        )
     return inputs
 
 

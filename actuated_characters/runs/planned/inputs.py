@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from actuated_characters.runs.planned.files import Planned
+from actuated_characters.runs.planned.pins import PlannedPin
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.velocities import PlannedVelocity
@@ -18,6 +19,7 @@ class PlannedInputs:
     throws: Sequence[PlannedThrow] = ()
     velocities: Sequence[PlannedVelocity] = ()
     strengths: Sequence[PlannedStrengths] = ()
+    pins: Sequence[PlannedPin] = ()
 
     def by_name(self) -> Mapping[str, Sequence[Planned]]:
         """Each kind by its name."""

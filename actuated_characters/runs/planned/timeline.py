@@ -3,20 +3,26 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from actuated_characters.runs.plan import SHARED, RunPlan, count_ticks, make_plan
 from actuated_characters.runs.planned.inputs import PlannedInputs
+from actuated_characters.runs.planned.pins import PlannedPin
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow, parse_throw, plan_throw
 from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push
 from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
 from controller_node.references.timeline.description import (
     Entry,
+    PinEntry,
+    Point,
     PushEntry,
     StrengthEntry,
     Timeline,
 )
 from controller_node.references.timeline.file import read_timeline
 from controller_node.references.timeline.motion import TimelineReference
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.loading import load_character
 from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, MotionError, one_of
@@ -103,6 +109,7 @@ def _default_duration(plan: RunPlan) -> float:
     timeline = plan.reference.timeline
     over = [plan.reference.end]
     over += [each.until for each in timeline.strengths]
+    over += [each.until for each in timeline.pins]
     over += [each.at + (each.duration or 0.0) for each in timeline.pushes]
     over += [each.at for each in timeline.throws]
     return max(over) + _AFTERWARDS
@@ -122,7 +129,9 @@ def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
         throws.append(throw)
         warnings += [f"{entry.place}: {line}" for line in in_the_way]
     strengths = _strengths(plan, timeline.strengths)
-    return TimelineRun(plan, PlannedInputs(pushes, throws, strengths=strengths), warnings)
+    pins = _pins(plan, timeline.pins)
+    inputs = PlannedInputs(pushes, throws, strengths=strengths, pins=pins)
+    return TimelineRun(plan, inputs, warnings)
 
 
 def _pushes(plan: RunPlan, entry: PushEntry) -> list[PlannedPush]:
@@ -145,6 +154,43 @@ def _pushes(plan: RunPlan, entry: PushEntry) -> list[PlannedPush]:
         for tick in range(begin, begin + whole, ticks)
         if tick <= plan.ticks
     ]
+
+
+def _pins(plan: RunPlan, entries: Sequence[PinEntry]) -> list[PlannedPin]:
+    """What holds and lets go, by the links' names; a link is held to one point at a time."""
+    rate, clock = plan.simulation.rate_hz, TickClock(plan.simulation.rate_hz)
+    links = [link.name for link in plan.character.links]
+    planned = list[PlannedPin]()
+    for link in sorted({entry.link for entry in entries}):
+        own = sorted((each for each in entries if each.link == link), key=lambda each: each.at)
+        for entry, after in zip(own, (*own[1:], None), strict=True):
+            _check_within(plan, entry)
+            if link not in links:
+                raise MotionError(f"{entry.place}: {one_of('link', link, links)}")
+            if after is not None and after.at < entry.until:
+                raise MotionError(
+                    f"{after.place}: at is {after.at:g}; it must be {entry.until:g} s or later, "
+                    f"when '{link}' is let go"
+                )
+            begin, end = round(entry.at * rate), round(entry.until * rate)
+            place = _held_place(plan, entry, links.index(link))
+            planned.append(PlannedPin(clock.stamp_ns(1 + begin), link, place, entry.force))
+            if end < plan.ticks and (after is None or round(after.at * rate) > end):
+                planned.append(PlannedPin(clock.stamp_ns(1 + end), link, place, 0.0))
+    return planned
+
+
+def _held_place(plan: RunPlan, entry: PinEntry, link: int) -> Point:
+    """Where in the world a link is held, m; without a point where the motion has it then."""
+    if entry.point is not None:
+        return entry.point
+    model, configuration = (
+        DynamicsModel(plan.character),
+        plan.reference.sample(entry.at).configuration,
+    )
+    model.update(configuration.position, np.zeros(plan.character.layout.size))
+    x, y, z = model.link_frames(np.array([link]))[0][0].tolist()
+    return x, y, z
 
 
 def _strengths(plan: RunPlan, entries: Sequence[StrengthEntry]) -> list[PlannedStrengths]:

@@ -92,6 +92,16 @@ class PushEntry(Entry):
 
 
 @dataclass(frozen=True)
+class PinEntry(Entry):
+    """A link's origin that is held to a point in the world."""
+
+    until: float  # s
+    link: str
+    point: Point | None  # m, world; None: where the motion has the link at the time
+    force: float  # N, the largest
+
+
+@dataclass(frozen=True)
 class ThrowEntry(Entry):
     """A ball that hits a link at the time, as `run --throw` has it."""
 
@@ -114,4 +124,5 @@ class Timeline:
     looks: tuple[TargetEntry, ...]
     strengths: tuple[StrengthEntry, ...]
     pushes: tuple[PushEntry, ...]
+    pins: tuple[PinEntry, ...]
     throws: tuple[ThrowEntry, ...]

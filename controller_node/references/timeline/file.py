@@ -14,6 +14,7 @@ from controller_node.references.timeline.description import (
     Ease,
     Entry,
     Layer,
+    PinEntry,
     Point,
     Pose,
     PushEntry,
@@ -31,9 +32,10 @@ from msgs_config.mappings import MappingReader, show_value
 TIMELINES_DIRECTORY = Path(__file__).parent / "data"
 _FILES = (".yaml", ".yml")
 _NODES = ("sim_node", "controller_node")
-_HERE, _NEVER = "here", "never"  # for the place of a clip, and for `out`
+_HERE, _NEVER = "here", "never"  # for the place of a clip or a pin, and for `out`
 _BLEND = 0.3  # s
 _SHORTEST = 1e-3  # s between two poses
+_PIN_FORCES = (1e-3, 1e6)  # N, least and most
 _BOUNDS = (-LARGEST_NUMBER, LARGEST_NUMBER)
 _T = TypeVar("_T")
 _TimedEntry = TypeVar("_TimedEntry", bound=Entry)
@@ -71,8 +73,7 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
     reader = MappingReader(file, content, MotionError)
     tracks = (
         *("keys", "clips", "steering", "reach", "look", "limp", "strengths"),
-        "pushes",
-        "throws",
+        *("pushes", "pins", "throws"),
     )
     reader.check_keys(("character", "duration", "run", "set", *tracks))
     has_duration = content.get("duration") is not None
@@ -92,6 +93,7 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
         looks=_track(file, content, "look", _target, target),
         strengths=(*limp, *strengths),
         pushes=_track(file, content, "pushes", _push, ("at", "link", "force", "for")),
+        pins=_track(file, content, "pins", _pin, ("at", "until", "link", "point", "force")),
         throws=_track(file, content, "throws", _throw, _THROW_KEYS),
     )
 
@@ -205,6 +207,13 @@ def _push(reader: MappingReader, place: str) -> PushEntry:
     duration = _time(reader, "for", _SHORTEST) if "for" in reader.content else None
     link, force = reader.text("link"), _vector(reader, "force")
     return PushEntry(place, _time(reader), link, force, duration)
+
+
+def _pin(reader: MappingReader, place: str) -> PinEntry:
+    at, link = _time(reader), reader.text("link")
+    until, force = _later(reader, "until", at), reader.number("force", None, *_PIN_FORCES)
+    point = None if reader.content.get("point") == _HERE else _vector(reader, "point")
+    return PinEntry(place, at, until, link, point, force)
 
 
 def _throw(reader: MappingReader, place: str) -> ThrowEntry:
