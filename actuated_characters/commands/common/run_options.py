@@ -26,8 +26,8 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         "--timeline",
         metavar="FILE",
         help="do what this timeline says, a shipped name or a .yaml file: poses, clips and "
-        "steering in time, pushes, balls and strengths; --character, --duration, --set and other "
-        "options take precedence",
+        "steering in time, pushes, balls, pins and strengths; --character, --duration, --set and "
+        "other options take precedence",
     )
     add_choice(
         tracked,
