@@ -1,9 +1,10 @@
 """Recordings by real nodes to which much happens, for tests of what comes again."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 
 import yaml
 from rclpy.context import Context
@@ -12,6 +13,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.runs.in_process import run_together
+from actuated_characters.runs.perturbation_node import PerturbationNode
+from actuated_characters.runs.planned.files import write_planned
+from actuated_characters.runs.planned.pins import PlannedPin
 from msgs_config.character.file import CHARACTERS_DIRECTORY
 from msgs_config.messages import topics
 from tests.support.physics import character
@@ -181,14 +185,23 @@ def record_pair(folder: Path) -> Path:
     return folder / "pair" / "run"
 
 
-def record_pair_in_process(folder: Path) -> Path:
-    """The same two pendulums, with all nodes in this process."""
+def record_pair_in_process(
+    folder: Path, pins: Mapping[str, Sequence[PlannedPin]] = MappingProxyType({})
+) -> Path:
+    """The same two pendulums, with all nodes in this process, and pins by their names."""
     directory = folder / "alone"
     prepare_directory(directory, overwrite=False)
+    write_planned(directory / "nothing.json", [])
+    senders: dict[str, Mapping[str, object]] = {}
+    for name, planned in pins.items():
+        write_planned(directory / f"{name}.json", planned)
+        files = {"pins": str(directory / f"{name}.json"), "pin_subscribers": 2}
+        senders[f"{name}/pusher"] = {"file": str(directory / "nothing.json"), **files}
     given = {
+        **senders,
         topics.RECORDER_NODE: {"characters": PAIR, "directory": str(directory)},
         **{f"{name}/{topics.CONTROLLER_NODE}": _one_of_pair(name) for name in PAIR},
         topics.SIM_NODE: _WORLD_OF_PAIR,
     }
-    run_together(given, directory)
+    run_together(given, directory, makers={"pusher": PerturbationNode})
     return directory

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from actuated_characters.bags.pins import own_pushes, pin_changes
-from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.cli import main
 from actuated_characters.fork.inputs import ForkPoint, recorded_stops
 from actuated_characters.metrics.recording_metrics import push_spans
@@ -20,6 +20,7 @@ from actuated_characters.runs.planned.pins import PlannedPin, read_pins
 from actuated_characters.runs.planned.timeline import TimelineRun, plan_timeline
 from msgs_config.errors import ActuatedCharactersError, RecordingError
 from msgs_config.messages.clock import TickClock
+from tests.support.recorded_nodes import record_pair_in_process
 from tests.support.runs import run_plan, run_plan_here, summary_of
 
 RATE = 240
@@ -181,6 +182,25 @@ def test_over_topics_composed_and_from_either_bag_it_has_one_hash(
         assert replay([read_recording(tmp_path / name)]).identical
     again = replay_commands(folder / "run", progress=lambda _: None, tell=lambda _: None)
     assert again.identical
+
+
+@pytest.mark.slow
+def test_of_two_characters_each_has_its_own_and_both_come_again(tmp_path: Path) -> None:
+    def pins(link: str, *forces: float) -> list[PlannedPin]:
+        at = zip((CLOCK.stamp_ns(5), CLOCK.stamp_ns(20)), forces, strict=True)
+        end = (0.0, 0.0, -1.0)
+        return [PlannedPin(stamp, link, (0.4, 0.1, -0.9), force, end) for stamp, force in at]
+
+    run = record_pair_in_process(
+        tmp_path, {"left": pins("rod", 3.0, 0.0), "right": pins("rod", 0.0, 5.0)}
+    )
+
+    left, right = read_recordings(run)
+    for recording, ticks in ((left, range(5, 20)), (right, range(20, 41))):
+        held = [row for row, each in enumerate(recording.pins) if each is not None]
+        assert held == [tick for tick in ticks if tick <= 40]
+    assert replay([left, right]).identical
+    assert replay_commands(run, progress=lambda _: None, tell=lambda _: None).identical
 
 
 # Forks

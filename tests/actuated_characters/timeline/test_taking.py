@@ -25,6 +25,7 @@ CONTENT: dict[str, Any] = {
     "pushes": [{"at": 0.3, "link": "chest", "force": [40, 0, 0]}],
     "strengths": [{"at": 1.2, "until": 1.9, "joints": ["neck"], "strength": 0.5}],
 }
+HELD = {"at": 0.4, "until": 1.7, "link": "right_wrist", "point": "here", "force": 60}
 
 
 def written(directory: Path, **changes: Any) -> Path:
@@ -81,11 +82,15 @@ def later(layer: dict[str, Any]) -> dict[str, Any]:
         ({"pushes": [*CONTENT["pushes"], {"at": 1.6, "link": "root", "force": [0, 50, 0]}]}, 1.6),
         ({"strengths": []}, 1.2),
         ({"limp": [{"at": 1.5, "until": 1.7}]}, 1.5),
+        ({"pins": [{**HELD, "at": 1.6}]}, 1.6),
         ({"throws": [{"at": 1.5, "mass": 1, "speed": 8, "target": "chest"}]}, (1.2, 1.5)),
         ({"duration": 2.5}, 2.0 - 1 / RATE),
         ({"duration": 1.5}, 1.5 - 1 / RATE),
     ],
-    ids=["a pose", "no layer", "a push", "no weakness", "limp", "a ball", "longer", "shorter"],
+    ids=[
+        *("a pose", "no layer", "a push", "no weakness", "limp", "a pin", "a ball", "longer"),
+        "shorter",
+    ],
 )
 def test_a_take_is_the_end_of_a_whole_run_of_the_edited_file(
     first: Take, tmp_path: Path, changes: dict[str, Any], since: float | tuple[float, float]
@@ -129,6 +134,34 @@ def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> No
         fourth.name,
     ]
     assert (third.begin, fourth.begin) == (1.5, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("pins", "since"),
+    [
+        ([{**HELD, "until": 1.5}], 1.5),  # let go sooner
+        ([{**HELD, "until": 1.8}], 1.7),
+        ([HELD, {**HELD, "at": 1.7, "until": 1.9, "force": 20}], 1.7),
+        ([HELD, {**HELD, "at": 1.2, "link": "left_wrist"}], 1.2),
+        ([], 0.4),
+    ],
+    ids=["sooner", "later", "another force", "another hand", "none"],
+)
+def test_a_take_of_other_pins_is_the_end_of_a_whole_run(
+    tmp_path: Path, pins: list[dict[str, Any]], since: float
+) -> None:
+    first = make_take(planned_take(written(tmp_path, pins=[HELD]), None))
+    file = written(tmp_path, pins=pins)
+
+    take = make_take(planned_take(file, first))
+
+    assert take.since == pytest.approx(since)
+    assert take.begin >= since - 0.25 - 1 / RATE
+    assert_same_end(take, whole_run(file, tmp_path / "whole"))
+    (own,), whole = read_whole(take.directory), read_recording(tmp_path / "whole")
+    rows = [[each and each.rows for each in one.pins] for one in (own, whole)]
+    assert rows[0] == (rows[1] or [None] * len(own.stamps_ns))
 
 
 def test_nothing_is_simulated_where_nothing_has_changed(first: Take) -> None:
