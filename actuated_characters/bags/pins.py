@@ -9,17 +9,31 @@ from msgs_config.messages.wrenches import WrenchArrays
 
 def own_pushes(recording: Recording, tick: int) -> WrenchArrays | None:
     """The pushes of a tick, by its row, without the pins' forces; None where no message came."""
+    return _parted(recording, tick)[0]
+
+
+def pin_forces(recording: Recording, tick: int) -> WrenchArrays | None:
+    """The pins' forces in a tick, by its row, at their points; None where there was no pin."""
+    return _parted(recording, tick)[1]
+
+
+def _parted(recording: Recording, tick: int) -> tuple[WrenchArrays | None, WrenchArrays | None]:
+    """The applied wrenches of a tick, in which the pins' forces are the last ones, in two."""
     applied = recording.applied_wrench[tick] if recording.applied_wrench else None
     pins = recording.pins[tick + 1] if recording.pins else None
     if applied is None or pins is None:
-        return applied
-    count = len(applied.links) - len(pins.links)  # the pins' forces are the last ones
-    return replace(
-        applied,
-        links=applied.links[:count],
-        wrenches=applied.wrenches[:count],
-        points=applied.points[:count],
+        return applied, None
+    count = len(applied.links) - len(pins.links)
+    pushes, forces = (
+        replace(
+            applied,
+            links=applied.links[rows],
+            wrenches=applied.wrenches[rows],
+            points=applied.points[rows],
+        )
+        for rows in (slice(count), slice(count, None))
     )
+    return pushes, forces
 
 
 def pin_changes(recording: Recording, tick: int) -> PinArrays | None:

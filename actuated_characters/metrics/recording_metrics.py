@@ -1,11 +1,11 @@
 """Measures recordings: errors and efforts over time, pushes, contacts, and the figures of a run."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from actuated_characters.bags.pins import own_pushes
+from actuated_characters.bags.pins import own_pushes, pin_forces
 from actuated_characters.bags.recording import Recording, Wrenches
 from actuated_characters.metrics.error_measures import (
     AT_LIMIT,
@@ -20,6 +20,7 @@ from msgs_config.character.model import Character
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.messages.configuration import RunConfiguration
 from msgs_config.messages.state import StampedReference, StampedState
+from msgs_config.messages.wrenches import WrenchArrays
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,20 @@ def saturated_shares(shares: FloatArray) -> FloatArray:
 
 def push_spans(recording: Recording) -> list[PushSpan]:
     """The pushes that acted: one for each sequence of ticks in which a link was pushed."""
+    return _spans(recording, own_pushes)
+
+
+def pin_spans(recording: Recording) -> list[PushSpan]:
+    """The pins that acted: one for each sequence of ticks in which a link was held."""
+    return _spans(recording, pin_forces)
+
+
+def _spans(
+    recording: Recording, acting: Callable[[Recording, int], WrenchArrays | None]
+) -> list[PushSpan]:
     forces: dict[str, dict[int, FloatArray]] = {}  # N, by link and tick
     for tick in range(len(recording.applied_wrench)):
-        if (wrenches := own_pushes(recording, tick)) is not None:
+        if (wrenches := acting(recording, tick)) is not None:
             for link, wrench in zip(wrenches.links, wrenches.wrenches, strict=True):
                 by_tick = forces.setdefault(link, {})
                 by_tick[tick] = by_tick.get(tick, np.zeros(3)) + wrench[:3]

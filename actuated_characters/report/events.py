@@ -1,4 +1,4 @@
-"""The events of a recording: pushes, throws, resets, changed parameters, modes, and a fall."""
+"""The events of a recording: pushes, pins, throws, resets, changed parameters, modes, a fall."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -9,11 +9,11 @@ import numpy as np
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.bags.thrown_balls import thrown_balls
-from actuated_characters.metrics.recording_metrics import push_spans
+from actuated_characters.metrics.recording_metrics import pin_spans, push_spans
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 PUSH, THROW, RESET, CHANGE, MODE, FALL = "push", "throw", "reset", "change", "mode", "fall"
-"""Kinds of events."""
+"""Kinds of events; a pin is marked as a push is."""
 
 TRACK = "TRACK"
 """The mode in which the reference is tracked."""
@@ -27,7 +27,7 @@ class Event:
 
     kind: str  # PUSH, THROW, RESET, CHANGE, MODE or FALL
     start: float  # s since the first state
-    duration: float = 0.0  # s: of a push, of a mode, and of the episode after a reset
+    duration: float = 0.0  # s: of a push or pin, of a mode, and of the episode after a reset
     text: str = ""
     label: str = ""  # a mode's name in a legend
     facts: Mapping[str, Any] = field(default_factory=dict)  # the numbers in the text
@@ -131,11 +131,12 @@ def _pushes(recording: Recording) -> list[Event]:
             PUSH,
             push.start,
             push.duration,
-            f"push on {push.link} for {push.duration:.3g} s: up to {push.largest_force:.4g} N, "
+            f"{what} {push.link} for {push.duration:.3g} s: up to {push.largest_force:.4g} N, "
             f"{push.impulse:.4g} N s",
             facts=asdict(push),
         )
-        for push in push_spans(recording)
+        for what, spans in (("push on", push_spans), ("pin holds", pin_spans))
+        for push in spans(recording)
     ]
 
 

@@ -16,12 +16,11 @@ acceleration that the force alone would give the point, so what the rate adds to
 that it slips.
 
 **Stable.** A force that is held over a tick is an explicit one, which a light link with a stiff
-spring would not survive. With u, the direction of a motion in the metric of M,
-`a = h^2 u' J'KJ u` and `b = h u' J'CJ u`, the motion from tick to tick grows by z with
-`z^2 - (2 - s a - b) z + 1 - b + (1 - s) a = 0`, where s is 1 for one engine step a tick, and
-`(1 + 1/r) / 2` for r of them. Its roots are in the unit circle (Jury 1964) if
+spring would not survive. A motion u (n,), of which `u' M u = 1`, grows from tick to tick by the z
+of `z^2 - (2 - s a - b) z + 1 - b + (1 - s) a = 0`, with `a = h^2 u' J'KJ u`, `b = h u' J'CJ u`, and
+`s = (1 + 1/r) / 2` for r engine steps a tick. Both z are within the unit circle (Jury 1964) if
 `b > (1 - s) a` and `2 b + (2 s - 1) a < 4`. The first holds as `c >= h k` makes `b >= a`, and the
-second since h^2 W and h W in K and C make a and b less than 1: at any k, c, h and M. It goes on
+second as h^2 W and h W in K and C make a and b less than 1: at any k, c, h and M. It goes on
 holding where contacts, joints at their limits and the like make W smaller than it is here.
 """
 
@@ -49,7 +48,7 @@ class PinForces:
     def __init__(self, character: Character, period: float) -> None:
         """For ticks of a period in s."""
         self._period = period
-        self._model = DynamicsModel(character)  # without gravity's part, which M has not
+        self._model = DynamicsModel(character)
 
     def wrenches(
         self, pins: Sequence[Pin], position: FloatArray, velocity: FloatArray

@@ -12,7 +12,7 @@ from actuated_characters.bags.pins import own_pushes, pin_changes
 from actuated_characters.bags.recording import Recording, read_recording, read_recordings
 from actuated_characters.cli import main
 from actuated_characters.fork.inputs import ForkPoint, recorded_stops
-from actuated_characters.metrics.recording_metrics import push_spans
+from actuated_characters.metrics.recording_metrics import pin_spans, push_spans
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.planned.files import write_planned
@@ -154,6 +154,9 @@ def test_the_pins_in_force_and_their_forces_are_recorded_apart(recording: Record
     pushed = [row for row in range(RATE) if (push := own_pushes(recording, row)) and push.links]
     assert pushed == [*range(24, 48), *range(168, 192)]
     assert [span.link for span in push_spans(recording)] == ["chest", "chest"]
+    held = {span.link: span for span in pin_spans(recording)}
+    assert (held["right_wrist"].start, held["left_wrist"].start) == pytest.approx((0.3, 0.4))
+    assert held["left_wrist"].duration == pytest.approx(0.6)
     pins = [each for row in range(RATE) if (each := pin_changes(recording, row))]
     assert [(each.stamp_ns, each.rows["right_wrist"][-1]) for each in (pins[0], pins[2])] == [
         (tick(0.3), 80.0),

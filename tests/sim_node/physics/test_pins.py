@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.errors import CommandError
-from sim_node.physics.pin_forces import YIELD_DISTANCE
+from sim_node.physics.pin_forces import YIELD_DISTANCE, PinForces
 from sim_node.physics.pins import Pin, PinQueue, changed_pins
 from tests.support.physics import (
     DAMPED,
@@ -20,6 +21,7 @@ from tests.support.physics import (
     character,
     joint_simulation,
     kinetic_energy,
+    random_state,
     simulation,
 )
 
@@ -145,6 +147,49 @@ def test_at_rest_a_pin_never_gives_energy(rate: int, force: float) -> None:
             assert energy <= 1.01 * first
             held(run, max(rate // 120, 1))
         assert force < 2.0 or energy < first
+
+
+@pytest.mark.parametrize("rate", [10, 60, 240, 1000, 5000])
+@pytest.mark.parametrize("force", [1.0, 300.0, 1e6])
+@pytest.mark.parametrize("substeps", [1, 4, 1000])
+def test_no_motion_grows_from_tick_to_tick(rate: int, force: float, substeps: int) -> None:
+    """The eigenvalues of the forces' own derivatives, with the whole mass matrix by numpy."""
+    whole, rng = character("humanoid"), np.random.default_rng(7)
+    position, still = random_state(whole, rng)[0], np.zeros(whole.layout.size)
+    model, law = DynamicsModel(whole), PinForces(whole, 1.0 / rate)
+    model.update(position, still)
+    hands, size = [row_of("humanoid", f"{side}_wrist") for side in ("left", "right")], len(still)
+    points = model.link_poses()[0][hands]
+    pins = [Pin(*each, ORIGIN, force) for each in zip(hands, map(tuple, points), strict=True)]
+    jacobian = np.vstack(
+        [model.point_jacobian(*each)[:3] for each in zip(hands, points, strict=True)]
+    )
+
+    def generalised(at: FloatArray, velocity: FloatArray) -> FloatArray:
+        pushes = law.wrenches(pins, at, velocity)
+        return jacobian.T @ np.concatenate([push.wrench[:3] for push in pushes])
+
+    small, step = 1e-8, 1.0 / rate
+    mass = model.mass_matrix()
+    by_velocity = np.array([generalised(position, small * each) for each in np.eye(size)]).T
+    # of positions the forces are linear, too: K in place of C, from places that are moved
+    law_at = np.zeros((size, size))
+    for entry, each in enumerate(np.eye(size)):
+        moved = (points - small * (jacobian @ each).reshape(-1, 3)).tolist()
+        pins = [
+            Pin(pin.link, tuple(place), ORIGIN, force)
+            for pin, place in zip(pins, moved, strict=True)
+        ]
+        law_at[:, entry] = generalised(position, still)
+    stiff, damped = (np.linalg.solve(mass, each / small) for each in (law_at, by_velocity))
+    share = 0.5 * (1.0 + 1.0 / substeps) * step**2
+    whole_step = np.block(
+        [
+            [np.eye(size) + share * stiff, step * np.eye(size) + share * damped],
+            [step * stiff, np.eye(size) + step * damped],
+        ]
+    )
+    assert np.abs(np.linalg.eigvals(whole_step)).max() < 1.0 + 1e-5
 
 
 @engines
