@@ -459,7 +459,7 @@ DIAGNOSTICS = Topic(
     of_world=True,
     is_measured=True,
     content=(
-        "one status per character: counts of commands by verdict, pushes, saturations, tick "
+        "one status per character: counts of commands by verdict, pushes, pins, saturations, tick "
         "times, lateness, ages of commands, faults, and warnings left out of the log after "
         "100 different ones; each second and at the end. `hardware_id` is the character in "
         "its namespace (`left/humanoid`), the same in both nodes' statuses. WARN: of the "
