@@ -60,6 +60,15 @@ def _timeline(path: Path) -> None:
     path.write_text(f"duration: 2\nkeys: [{{poses: {poses}}}]\n", encoding="utf-8")
 
 
+def _takes(path: Path) -> None:
+    """Two takes of a timeline, the second one of an arm that is raised less."""
+    file = path.with_name("dance.yaml")
+    _timeline(file)
+    _call(file, "take", file)
+    file.write_text(file.read_text(encoding="utf-8").replace("1.0}", "0.8}"), encoding="utf-8")
+    _call(file, "take", file)
+
+
 def _robot(path: Path) -> None:
     write_robot(path)
 
@@ -116,6 +125,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
     "dance.yaml": _timeline,
+    "dance.takes": _takes,
     "body.glb": _body,
     "joints.yaml": _joints,
     "swing.py": _code("README.md", "class Swing"),

@@ -34,7 +34,7 @@ FORMS: dict[str, tuple[Field, ...]] = {
     "steering": (_UNTIL, Field("velocity", VECTOR, "0.8, 0, 0", "forward, left m/s; turn rad/s")),
     "reach": (
         _UNTIL,
-        Field("link", LINK, "", "what reaches"),
+        Field("link", LINK, "right_wrist", "what reaches"),
         Field("point", VECTOR, "0.4, 0, 1.2", "m, world"),
         _IN,
         _OUT,
@@ -47,13 +47,13 @@ FORMS: dict[str, tuple[Field, ...]] = {
         Field("strength", NUMBER, 0.3, "0 to 1"),
     ),
     "pushes": (
-        Field("link", LINK, "", "what is pushed"),
+        Field("link", LINK, "chest", "what is pushed"),
         Field("force", VECTOR, "0, 200, 0", "N, world"),
     ),
     "throws": (
         Field("mass", NUMBER, 2.0, "kg"),
         Field("speed", NUMBER, 6.0, "m/s"),
-        Field("target", LINK, "", "the link that it flies to"),
+        Field("target", LINK, "chest", "the link that it flies to"),
         Field("from", TEXT, "left", "the side that it comes from"),
     ),
 }

@@ -11,7 +11,8 @@ from actuated_characters.viewer.editor.event_forms import FORMS, LINK, NUMBER, F
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.recorded.playback_controls import on
 
-_LASTS = 1.0  # s that an event lasts at first
+_LASTS, _SHORTEST = 1.0, 0.02  # s: at first, at least
+_UNTIL, _LENGTH = "until", "lasts (s)"
 
 
 class EventForm:
@@ -31,20 +32,20 @@ class EventForm:
 
     def _add(self, field: Field) -> Any:
         label = f"{field.name}"
+        if field.name == _UNTIL:  # said as a length: the present time may yet change
+            hint = "s from the present time on"
+            return self._gui.add_number(_LENGTH, _LASTS, min=_SHORTEST, step=0.01, hint=hint)
         if field.kind == NUMBER:
-            initial = _LASTS if field.default is None else float(field.default)
-            return self._gui.add_number(label, initial, step=0.01, hint=field.about)
+            return self._gui.add_number(label, float(field.default), step=0.01, hint=field.about)
         if field.kind == LINK:
-            return self._gui.add_dropdown(label, self._links, hint=field.about)
+            first = field.default if field.default in self._links else self._links[0]
+            return self._gui.add_dropdown(label, self._links, initial_value=first, hint=field.about)
         return self._gui.add_text(label, str(field.default), hint=field.about)
 
     def _show(self, track: str) -> None:
         for name, handles in self._handles.items():
             for handle in handles.values():
                 handle.visible = name == track
-        until = self._handles[track].get("until")
-        if until is not None:
-            until.value = round(self._session.time + _LASTS, 3)
 
     def edit(self) -> edits.Edit:
         """The edit that adds what the fields say at the present time.
@@ -54,4 +55,6 @@ class EventForm:
         """
         track = str(self._track.value)
         given = {name: handle.value for name, handle in self._handles[track].items()}
+        if _UNTIL in given:
+            given[_UNTIL] = edits.rounded(self._session.time + float(given[_UNTIL]))
         return edits.add_event(track, read_form(track, self._session.time, given))

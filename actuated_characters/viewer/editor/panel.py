@@ -24,6 +24,8 @@ _WHOLE, _LIMB = "whole body", "limb alone"
 _ALL, _MOVED = "all joints", "joints that moved"
 _NONE = "none"
 _EASES = tuple(ease.value for ease in Ease)
+_STAYS, _LEAVES = "it stays", "it gives way"  # the layer after its last key
+_NEVER = "never"
 
 
 class EditorPanel:
@@ -42,14 +44,15 @@ class EditorPanel:
         self._wrong = gui.add_markdown("", visible=False)
         self.time = PlaybackControls(gui, session.playback, actions)
         self._add_edits()
-        self._take_panel = TakePanel(gui, takes, self.act, self.tell, actions)
+        self._take_panel = TakePanel(gui, session, takes, self.act, self.tell, actions)
         self._add_keys()
+        self._add_events()
+        self._add_layers()
         with gui.add_folder("Dragging", expand_by_default=False):
             self._moves: Any = gui.add_dropdown("Moves", (_WHOLE, _LIMB))
             self._stands: Any = gui.add_checkbox("Feet stay", initial_value=True)
         with gui.add_folder("Joint", expand_by_default=False):
             self._joint = JointFields(gui, session, self.act, actions)
-        self._add_events()
         self.show()
 
     @property
@@ -86,13 +89,12 @@ class EditorPanel:
             "Pose",
             {"Key": session.set_key, "Mirror": session.mirror, "Delete": session.delete_key},
         )
-        self._buttons("Edits", {"Undo": session.undo, "Redo": session.redo})
+        undo = {"Undo": session.undo, "Redo": session.redo, "Read again": session.read_again}
+        self._buttons("File", undo)
 
     def _add_keys(self) -> None:
         gui, session = self._gui, self._session
         with gui.add_folder("Keys"):
-            self._layer: Any = gui.add_dropdown("Layer", ("",))
-            on(self._actions, self._layer, self._choose_layer)
             self._writes: Any = gui.add_dropdown("A key has", (_ALL, _MOVED))
             on(
                 self._actions,
@@ -106,17 +108,23 @@ class EditorPanel:
             on(self._actions, self._ease, lambda ease: self.act(partial(session.set_ease, ease)))
             self._to: Any = gui.add_number("Move to (s)", 0.0, min=0.0, step=0.01)
             self._buttons("This key", {"Move": lambda: session.move_key(float(self._to.value))})
+
+    def _add_layers(self) -> None:
+        gui = self._gui
+        with gui.add_folder("Layers", expand_by_default=False):
+            self._layer: Any = gui.add_dropdown("Layer", ("",))
+            on(self._actions, self._layer, self._choose_layer)
+            self._after: Any = gui.add_dropdown(
+                "After the last", (_STAYS, _LEAVES), hint="whether steering and clips show again"
+            )
+            on(self._actions, self._after, lambda label: self.act(partial(self._set_out, label)))
             self._name: Any = gui.add_text("New layer", "")
             self._buttons("Layers", {"Add": self._add_layer, "Remove": self._remove_layer})
-            self._length: Any = gui.add_number(
-                "Duration (s)", 0.0, min=0.0, step=0.1, hint="0: until 1 s after what is last"
-            )
-            on(self._actions, self._length, self._set_duration)
-            self._buttons("File", {"Read again": session.read_again})
 
     def _choose_layer(self, label: str) -> None:
         if label in self._layer.options:
             self._session.layer = self._layer.options.index(label)
+            self._shown_version = -1
 
     def _add_layer(self) -> None:
         name = str(self._name.value).strip()
@@ -125,9 +133,9 @@ class EditorPanel:
     def _remove_layer(self) -> None:
         self._session.edit(edits.delete_layer(self._session.layer))
 
-    def _set_duration(self, seconds: float) -> None:
-        value = float(seconds) or None
-        self.act(lambda: self._session.edit(edits.set_value("duration", value)))
+    def _set_out(self, label: str) -> None:
+        out = _NEVER if label == _STAYS else None
+        self._session.edit(edits.set_layer(self._session.layer, "out", out))
 
     def _add_events(self) -> None:
         gui, session = self._gui, self._session
@@ -196,7 +204,10 @@ class EditorPanel:
         names = [f"{row + 1} {layer.get('name', '')}".strip() for row, layer in enumerate(layers)]
         self._layer.options = tuple(names) or ("",)
         self._layer.value = self._layer.options[session.layer if names else 0]
-        self._length.value = float(content.get("duration") or 0.0)
+        out = layers[session.layer].get("out") if names else _NEVER
+        self._after.value = _STAYS if out == _NEVER else _LEAVES
+        self._after.disabled = not names
+        self._take_panel.show_settings(content)
         self._numbers = [
             (track, number) for track in TRACKS for number in range(len(content.get(track, [])))
         ]
