@@ -90,10 +90,15 @@ class Hands:
         """Click on what has a label."""
         self._click_at(*self._place(f"{_FIND}({json.dumps(label)})"))
 
+    def unfold(self, folder: str) -> None:
+        """Open a folder of the panel."""
+        self.click(folder)
+        time.sleep(1.5)
+
     def choose(self, label: str, option: str) -> None:
         """Choose an option, or the one that begins so, of a list."""
-        self._click_at(*self._place(f"{_INPUT}({json.dumps(label)})"))
         found = f"{_OPTION}({json.dumps(option)})"
+        self._click_at(*self._place(f"{_INPUT}({json.dumps(label)})"))
         wait_until(lambda: self._browser.evaluate(f"Boolean({found})"), option, PATIENCE)
         time.sleep(0.4)  # the list unfolds
         self._click_at(*self._place(found))
@@ -152,6 +157,8 @@ def wave(hands: Hands) -> None:
     hands.click("Key")
     hands.wait("key 1 of 1")
     hands.click("Copy")
+    hands.unfold("Dragging")
+    hands.choose("Moves", "limb alone")
     for at, way in ((0.6, RAISED), (1.0, OUT), (1.4, IN)):
         hands.go_to(at)
         hands.drag_hand(way)
@@ -162,7 +169,7 @@ def wave(hands: Hands) -> None:
     hands.go_to(2.0)
     hands.click("Paste")
     hands.wait("key 5 of 5")
-    hands.click("Layers")
+    hands.unfold("Layers")
     hands.choose("After the last", "it gives way")
     hands.choose("Behaviour", "active_ragdoll")
 
@@ -179,7 +186,7 @@ def simulate(hands: Hands, title: str, number: int) -> float:
 def add_events(hands: Hands) -> None:
     """Steps, then a hit by which it goes limp."""
     hands.choose("Seen", "none")
-    hands.click("Events")
+    hands.unfold("Events")
     hands.go_to(2.4)
     hands.choose("New", "steering")
     hands.type("lasts (s)", "1.2")

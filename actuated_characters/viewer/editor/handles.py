@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.references.posing import Posing, Target
+from controller_node.references.posing import REACHED_M, Posed, Posing, Target
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition, JointType
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Character, Vector
 
+_BEND_RAD = 0.3  # of hinges that are tried bent
 _STANDS_BELOW_M = 0.05  # height of a link's lowest point, from which on it does not stand
 
 
@@ -76,9 +77,20 @@ class Drag:
         self._posing, self._pose, self._last = posing, pose, pose
         self._link, self._point = character.links[handle.row].name, handle.point
         self._holds = tuple(name for name in stands if name != self._link)
+        self._bends = self._find_bends(character)
         self._free = self._find_free(character, handle, limb_alone=limb_alone)
         self.place = posing.place(pose, self._link, handle.point)
         """Where the point was (3,), m, world."""
+
+    def _find_bends(self, character: Character) -> FloatArray:
+        """How far the hinges of the limb go (n,), rad, to be bent into their range."""
+        layout, position = character.layout, self._pose.position
+        lower, upper = character.position_bounds()
+        hinges = [each.name for each in layout.joints if each.type is JointType.REVOLUTE]
+        bent = self._posing.chain(self._link) & layout.mask(hinges)
+        inwards = upper - position >= position - lower
+        bends: FloatArray = np.where(bent, np.where(inwards, _BEND_RAD, -_BEND_RAD), 0.0)
+        return bends
 
     def _find_free(
         self, character: Character, handle: Handle, *, limb_alone: bool
@@ -97,8 +109,18 @@ class Drag:
         """The pose with the point at a place (3,), m, world, or as near as it can come."""
         x, y, z = place.tolist()
         target = Target(self._link, (x, y, z), self._point)
-        found = self._posing.fit(
-            self._pose, [target], free=self._free, holds=self._holds, start=self._last
-        )
+        found = self._fit(target, self._last)
+        if not found.reached:
+            # no small turn of a straight limb brings its end nearer to its root: it is bent first
+            last = self._last
+            bent = GeneralizedPosition(last.position + self._bends, last.orientations_xyzw)
+            other = self._fit(target, bent)
+            if other.residual < found.residual - REACHED_M:
+                found = other
         self._last = found.pose
         return found.pose
+
+    def _fit(self, target: Target, start: GeneralizedPosition) -> Posed:
+        return self._posing.fit(
+            self._pose, [target], free=self._free, holds=self._holds, start=start
+        )

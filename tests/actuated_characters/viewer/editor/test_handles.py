@@ -104,3 +104,16 @@ def test_a_limb_alone_is_all_that_moves() -> None:
     arm = POSING.chain("right_wrist")
     assert found.position[~arm].tolist() == pose.position[~arm].tolist()
     assert not np.allclose(found.position[arm], pose.position[arm])
+
+
+@pytest.mark.parametrize("way", [(0.0, -0.25, 0.55), (0.0, 0.0, 0.3), (0.0, -0.1, 0.8)])
+def test_a_straight_arm_bends_where_its_hand_is_dragged_nearer(
+    way: tuple[float, float, float],
+) -> None:
+    held = drag("right_wrist", rest(HUMANOID), limb_alone=True)
+    begin, point = held.place.copy(), handle_of("right_wrist").point
+
+    for share in np.linspace(0.05, 1.0, 20):
+        wanted = begin + share * np.array(way)
+        place = POSING.place(held.pose(wanted), "right_wrist", point)
+        assert place == pytest.approx(wanted, abs=2e-3)

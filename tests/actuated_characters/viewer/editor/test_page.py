@@ -175,3 +175,51 @@ def test_any_character_can_be_posed(name: str, tmp_path: Path) -> None:
     named = Document(session.document.file).content["keys"][0]["poses"][0]["pose"]
     assert list(named) == list(whole.layout.dof_names)
     assert not np.allclose(list(named.values()), whole.rest_position, atol=1e-6)
+
+
+def change(page: EditorPage, handle: Any, value: Any) -> None:
+    """Do what a client does who sets a control of the panel."""
+    handle._impl.value = value
+    for update in handle._impl.update_cb:
+        _run(update)
+    page.step(0.0)
+
+
+def test_a_layer_stays_until_it_is_told_to_give_way(page: EditorPage, session: Session) -> None:
+    after = page._panel._after
+    assert after.disabled
+    click(page, "Key")
+    assert (after.value, after.disabled) == ("it stays", False)
+
+    change(page, after, "it gives way")
+    assert "out" not in session.document.content["keys"][0]
+    click(page, "Undo")
+    assert after.value == "it stays"
+
+
+def test_behaviour_and_duration_are_those_of_the_file(page: EditorPage, session: Session) -> None:
+    takes = page._panel._take_panel
+    change(page, takes._behaviour, "active_ragdoll")
+    change(page, takes._length, 9.0)
+    assert session.document.content["run"] == {"behaviour": "active_ragdoll"}
+    assert session.document.content["duration"] == 9.0
+
+    session.document.file.write_text("run: {behaviour: state_machine, planner: none}\n")
+    click(page, "Read again")
+    assert (takes._behaviour.value, takes._length.value) == ("state_machine", 0.0)
+    change(page, takes._behaviour, "reactive")
+    assert session.document.content["run"] == {"behaviour": "reactive", "planner": "none"}
+
+
+def test_an_event_lasts_from_the_time_at_which_it_is_added(
+    page: EditorPage, session: Session
+) -> None:
+    form = page._panel._form
+    form._track.value = "steering"
+    form._show("steering")
+    form._handles["steering"]["until"].value = 1.2
+    session.playback.seek(2.4)
+    click(page, "Add event")
+
+    (event,) = session.document.content["steering"]
+    assert (event["at"], event["until"]) == (2.4, 3.6)
