@@ -49,6 +49,12 @@ _INPUT = """(label => {
 _OPTION = """(label => [...document.querySelectorAll("[role=option]")].find(
     each => each.innerText.trim().startsWith(label) && each.offsetParent !== null))"""
 
+_TIME_LINE = """(() => {
+    const box = document.querySelector("#time-line .track").getBoundingClientRect();
+    const text = document.querySelector("#time-line .time").innerText;
+    return [box.x, box.y, box.width, box.height, parseFloat(text.split("/")[1])];
+})()"""
+
 
 class Hands:
     """Who has a mouse and a keyboard, and counts what is done with them."""
@@ -115,19 +121,14 @@ class Hands:
         time.sleep(0.5)
 
     def go_to(self, at: float) -> None:
-        """Click on the time line."""
-        box = self._browser.evaluate(
-            "(b => [b.x, b.y, b.width, b.height])"
-            "(document.querySelector('#time-line .track').getBoundingClientRect())"
-        )
-        last = float(
-            self._browser.evaluate("document.querySelector('#time-line .time').innerText")
-            .split("/")[1]
-            .replace("s", "")
-        )
-        # within 2 pixels of the marks' lanes, where nothing but the time is clicked on
-        self._click_at(box[0] + box[2] * at / last, box[1] + box[3] - 20.0)
-        self.wait(f"{at:.3f} s")
+        """Click on the time line, again where it has just become longer."""
+        begun, shown = time.monotonic(), f"{at:.3f} s"
+        while shown not in self.text() and time.monotonic() - begun < PATIENCE:
+            left, top, width, height, last = self._browser.evaluate(_TIME_LINE)
+            # above the keys, whose marks would take the click
+            self._click_at(left + width * at / last, top + height - 20.0)
+            time.sleep(2.0)
+        self.wait(shown)
 
     def drag_hand(self, way: tuple[float, float]) -> None:
         """Drag the right hand by some pixels."""
