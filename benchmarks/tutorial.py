@@ -105,8 +105,11 @@ class Hands:
     def choose(self, label: str, option: str) -> None:
         """Choose an option, or the one that begins so, of a list."""
         found = f"{_OPTION}({json.dumps(option)})"
-        self._click_at(*self._place(f"{_INPUT}({json.dumps(label)})"))
-        wait_until(lambda: self._browser.evaluate(f"Boolean({found})"), option, PATIENCE)
+        begun = time.monotonic()
+        while not self._browser.evaluate(f"Boolean({found})"):
+            assert time.monotonic() - begun < PATIENCE, f"{label} has no {option}"
+            self._click_at(*self._place(f"{_INPUT}({json.dumps(label)})"))
+            time.sleep(1.0)  # a folder that still unfolds is clicked on again
         time.sleep(0.4)  # the list unfolds
         self._click_at(*self._place(found))
 
