@@ -50,6 +50,12 @@ FORMS: dict[str, tuple[Field, ...]] = {
         Field("link", LINK, "chest", "what is pushed"),
         Field("force", VECTOR, "0, 200, 0", "N, world"),
     ),
+    "pins": (
+        _UNTIL,
+        Field("link", LINK, "", "what is held"),
+        Field("point", VECTOR, "0.4, 0, 1.2", "m, world"),
+        Field("force", NUMBER, 300.0, "N, at most"),
+    ),
     "throws": (
         Field("mass", NUMBER, 2.0, "kg"),
         Field("speed", NUMBER, 6.0, "m/s"),

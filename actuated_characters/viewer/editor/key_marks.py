@@ -16,6 +16,7 @@ _COLORS = {
     "look": "#8c6d31",
     "limp": "#7f7f7f",
     "strengths": "#9467bd",
+    "pins": "#d62728",
 }
 
 

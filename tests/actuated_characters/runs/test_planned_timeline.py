@@ -26,6 +26,7 @@ from tests.support.runs import run_plan, run_plan_here, summary_of
 RATE = 240
 CLOCK = TickClock(RATE)
 ASSISTED = {"planner": "none"}
+HANGS = "hang"
 WAVE = {"poses": [{"at": 0.3, "pose": {"right_elbow": 1.0}}]}
 EVENTFUL: dict[str, Any] = {
     "duration": 1.0,
@@ -151,13 +152,14 @@ def test_a_shipped_timeline_can_be_run_as_it_is(name: str) -> None:
     run = plan_timeline(name, {}, {})
 
     assert run.warnings == []
-    assert PlannerParameters.of(run.plan.controller).planner == "predictive"
+    wanted = "none" if name == HANGS else "predictive"  # its pins bear what hangs
+    assert PlannerParameters.of(run.plan.controller).planner == wanted
     assert run.reference.end <= run.plan.ticks / RATE
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("name", shipped_timelines())
+@pytest.mark.parametrize("name", sorted({*shipped_timelines()} - {HANGS}))
 def test_a_shipped_timeline_comes_to_its_end_by_joint_torques_alone(name: str, seed: int) -> None:
     run = plan_timeline(name, {}, {"plan.seed": seed})
     layout = run.plan.character.layout
