@@ -258,7 +258,6 @@ def do_it(hands: Hands, file: Path) -> None:
 
     hands.wait("no keys yet")
     time.sleep(3.0)  # the camera comes nearer
-    hands.picture("begin")
     measured("wave", lambda: wave(hands))
     measured("take 1", lambda: simulate(hands, "wave", 1))
     hands.go_to(1.0)
