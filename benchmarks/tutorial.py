@@ -184,7 +184,7 @@ def simulate(hands: Hands, title: str, number: int) -> float:
     hands.type("Title", title)
     begun = time.monotonic()
     hands.click("Simulate")
-    hands.wait(f"take {number}: ", SIMULATED)
+    hands.wait(f"take {number}", SIMULATED)
     return time.monotonic() - begun
 
 
