@@ -7,8 +7,8 @@ from typing import Any
 from msgs_config import files
 from msgs_config.errors import MotionError
 
-NUMBER, TEXT, VECTOR, NAMES, LINK = "number", "text", "vector", "names", "link"
-"""Kinds of fields; a vector is three numbers, names are one or more."""
+NUMBER, TEXT, VECTOR, NAMES, LINK, PLACE = "number", "text", "vector", "names", "link", "place"
+"""Kinds of fields; a vector is three numbers, as is a place, or `here`; names are one or more."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,7 @@ class Field:
     about: str
 
 
+_HERE = "here"
 _UNTIL = Field("until", NUMBER, None, "its end, s")
 _IN = Field("in", NUMBER, 0.3, "s in which it comes")
 _OUT = Field("out", NUMBER, 0.3, "s in which it goes")
@@ -53,7 +54,7 @@ FORMS: dict[str, tuple[Field, ...]] = {
     "pins": (
         _UNTIL,
         Field("link", LINK, "", "what is held"),
-        Field("point", VECTOR, "0.4, 0, 1.2", "m, world"),
+        Field("point", PLACE, _HERE, "m, world; here: where the motion has it then"),
         Field("force", NUMBER, 300.0, "N, at most"),
     ),
     "throws": (
@@ -75,7 +76,9 @@ def read_form(track: str, at: float, given: Mapping[str, Any]) -> dict[str, Any]
     event: dict[str, Any] = {"at": at}
     for field in FORMS[track]:
         value = given[field.name]
-        if field.kind == VECTOR:
+        if field.kind == PLACE and str(value).strip() == _HERE:
+            value = _HERE
+        elif field.kind in (VECTOR, PLACE):
             value = _read_vector(field.name, str(value))
         elif field.kind == NAMES:
             value = [name.strip() for name in str(value).split(",") if name.strip()]

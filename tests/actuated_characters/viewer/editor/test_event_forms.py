@@ -18,6 +18,12 @@ def test_what_is_typed_becomes_numbers_and_names() -> None:
         "strengths", 1.0, {"until": 2.0, "joints": "neck, right_knee", "strength": 0.3}
     )
 
+    held = {"until": 3.0, "link": "neck", "force": 90.0}
+    here = read_form("pins", 2.0, {**held, "point": "here"})
+    there = read_form("pins", 2.0, {**held, "point": "0.1, 0, 2"})
+
+    assert here == {"at": 2.0, **held, "point": "here"}
+    assert there["point"] == [0.1, 0.0, 2.0]
     assert push == {"at": 2.0, "link": "chest", "force": [0.0, 200.0, 0.0]}
     assert weak["joints"] == ["neck", "right_knee"]
 
