@@ -1,6 +1,6 @@
 """`pusher`: sends pushes, throws, velocities, strengths and pins, planned before a run."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,57 +57,11 @@ class PerturbationNode(ComposableNode):
         """
         super().__init__(node or ros_node("pusher"))
         settings = declared_settings(self.node, PerturbationSettings)
-        session = settings.session.id
-        pushes = read_pushes(Path(settings.file))
         self._outgoing = [
-            _PlannedPublisher(
-                self.node,
-                topics.EXTERNAL_WRENCH,
-                [encode_wrenches(replace(push.arrays(), frame_id=session)) for push in pushes],
-                settings.wait_for_subscribers,
-            )
+            _PlannedPublisher(self.node, topic, list(messages(Path(file))), subscribers)
+            for topic, file, subscribers, messages in _planned(settings)
+            if file
         ]
-        if settings.throws:
-            throws, codec = read_throws(Path(settings.throws)), ThrowCodec(session)
-            self._outgoing.append(
-                _PlannedPublisher(
-                    self.node,
-                    topics.THROW,
-                    [codec.encode(each.stamp_ns, each.throw) for each in throws],
-                    settings.throw_subscribers,
-                )
-            )
-        if settings.velocities:
-            velocities = read_velocities(Path(settings.velocities))
-            self._outgoing.append(
-                _PlannedPublisher(
-                    self.node,
-                    topics.CMD_VEL_STAMPED,
-                    [each.encode() for each in velocities],
-                    settings.velocity_subscribers,
-                )
-            )
-        if settings.strengths:
-            strengths = read_strengths(Path(settings.strengths))
-            self._outgoing.append(
-                _PlannedPublisher(
-                    self.node,
-                    topics.STRENGTH.of(topics.CONTROLLER_NODE),
-                    [each.encode() for each in strengths],
-                    settings.strength_subscribers,
-                )
-            )
-
-        if settings.pins:
-            pins = read_pins(Path(settings.pins))
-            self._outgoing.append(
-                _PlannedPublisher(
-                    self.node,
-                    topics.PIN,
-                    [encode_pins(each.arrays(session)) for each in pins],
-                    settings.pin_subscribers,
-                )
-            )
 
     def turns(self, stop: StopFlag, executor: Executor) -> Turns:
         """Send as soon as all subscribers are there, then stay until `stop`."""
@@ -123,6 +77,37 @@ class PerturbationNode(ComposableNode):
             if is_heard:
                 executor.received()
             yield AT_ONCE if is_heard else UNTIL_A_MESSAGE
+
+
+def _planned(
+    settings: PerturbationSettings,
+) -> Iterator[tuple[Topic, str, int, Callable[[Path], Iterator[bytes]]]]:
+    """Of each kind: the topic, the file, how many are to hear it, and the file's messages."""
+    session = settings.session.id
+    codec = ThrowCodec(session)
+
+    def pushes(file: Path) -> Iterator[bytes]:
+        for each in read_pushes(file):
+            yield encode_wrenches(replace(each.arrays(), frame_id=session))
+
+    def throws(file: Path) -> Iterator[bytes]:
+        return (codec.encode(each.stamp_ns, each.throw) for each in read_throws(file))
+
+    def velocities(file: Path) -> Iterator[bytes]:
+        return (each.encode() for each in read_velocities(file))
+
+    def strengths(file: Path) -> Iterator[bytes]:
+        return (each.encode() for each in read_strengths(file))
+
+    def pins(file: Path) -> Iterator[bytes]:
+        return (encode_pins(each.arrays(session)) for each in read_pins(file))
+
+    strength = topics.STRENGTH.of(topics.CONTROLLER_NODE)
+    yield topics.EXTERNAL_WRENCH, settings.file, settings.wait_for_subscribers, pushes
+    yield topics.THROW, settings.throws, settings.throw_subscribers, throws
+    yield topics.CMD_VEL_STAMPED, settings.velocities, settings.velocity_subscribers, velocities
+    yield strength, settings.strengths, settings.strength_subscribers, strengths
+    yield topics.PIN, settings.pins, settings.pin_subscribers, pins
 
 
 class _PlannedPublisher:
