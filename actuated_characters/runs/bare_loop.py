@@ -6,6 +6,7 @@ import numpy as np
 
 from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.pins import PlannedPin, pin_schedule
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush, push_schedule
@@ -28,8 +29,9 @@ def ticks_in_process(
     controller: Controller | None = None,
     watch: Watch | None = None,
     strengths: Sequence[PlannedStrengths] = (),
+    pins: Sequence[PlannedPin] = (),
 ) -> Iterator[Tick]:
-    """The ticks of a plan, one by one, with pushes, throws and strengths.
+    """The ticks of a plan, one by one, with pushes, throws, strengths and pins.
 
     The states are those of a run over topics, bit for bit. To look at the controller as well, give
     a fresh one of the plan; to look at the simulation, a `watch`.
@@ -40,7 +42,7 @@ def ticks_in_process(
     controller = controller or make_controller(plan.character, plan.reference, plan.controller)
     setup = make_character_setup(plan.character, plan.simulator)
     wrenches, clock = push_schedule(plan, pushes), TickClock(plan.simulation.rate_hz)
-    balls = ThrowQueue()
+    balls, held = ThrowQueue(), pin_schedule(plan, pins)
     for throw in throws:
         balls.add(throw.throw, clock.first_tick_from(throw.stamp_ns))
     with Simulation([setup], make_simulation_settings(plan.simulator)) as simulation:
@@ -58,7 +60,7 @@ def ticks_in_process(
             effort, reference = controller.compute_effort(state, episode_ns, touched)
             commanded = effort if drives_all else np.where(character.commanded, effort, 0.0)
             acting, thrown = wrenches.take(simulation.tick), balls.take(simulation.tick)
-            simulation.step([commanded], [acting], thrown)
+            simulation.step([commanded], [acting], thrown, [held.take(simulation.tick)])
             following = character.state
             assert following.effort is not None
             if watch is not None:

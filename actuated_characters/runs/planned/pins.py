@@ -1,10 +1,14 @@
 """Pins that are planned before a run, each with the stamp of the tick that it begins with."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.files import Planned, read_planned
+from msgs_config.messages.clock import TickClock
 from msgs_config.messages.pins import PinArrays
+from sim_node.physics.pins import PinQueue
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,16 @@ class PlannedPin(Planned):
         """The pin as the content of a message for the simulator of a session."""
         row = (*self.place, *self.point, self.force)
         return PinArrays.of_rows(self.stamp_ns, {self.link: row}, session)
+
+
+def pin_schedule(plan: RunPlan, pins: Sequence[PlannedPin]) -> PinQueue:
+    """The pins of a plan as its simulator takes them, without topics."""
+    schedule, clock = PinQueue(plan.character), TickClock(plan.simulation.rate_hz)
+    for pin in pins:
+        content, first_tick = pin.arrays(""), clock.first_tick_from(pin.stamp_ns)
+        arrays = content.places, content.points, content.forces
+        schedule.add(content.links, *arrays, first_tick=first_tick)
+    return schedule
 
 
 def planned_pins(pins: PinArrays) -> list[PlannedPin]:

@@ -15,6 +15,7 @@ from actuated_characters.fork.inputs import ForkPoint, recorded_stops
 from actuated_characters.metrics.recording_metrics import pin_spans, push_spans
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
+from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.pins import PlannedPin, read_pins
 from actuated_characters.runs.planned.timeline import TimelineRun, plan_timeline
@@ -170,6 +171,10 @@ def test_the_pins_in_force_and_their_forces_are_recorded_apart(recording: Record
 
 def test_from_its_bag_it_is_the_same_run(folder: Path, recording: Recording) -> None:
     assert replay([recording]).identical
+    run = planned(folder)
+    ticks = ticks_in_process(run.plan, run.inputs.pushes, pins=run.inputs.pins)
+    for row, each in enumerate(ticks, start=1):
+        assert each.following.position.tobytes() == recording.position[row].tobytes()
     assert summary_of(folder / "run")["rejected_pins"] == 0
 
 
