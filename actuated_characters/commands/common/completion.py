@@ -34,10 +34,12 @@ def _characters(prefix: str, **ignored: object) -> Iterable[str]:
 def _clips(prefix: str, parsed_args: argparse.Namespace, **ignored: object) -> Iterable[str]:
     from argcomplete.completers import FilesCompleter
 
+    from actuated_characters.commands.common.settings import CHARACTER
     from msgs_config.character.loading import load_character
     from msgs_config.clips.reading import available_clips
 
-    return [*available_clips(load_character(parsed_args.character)), *FilesCompleter()(prefix)]
+    character = load_character(parsed_args.character or CHARACTER)
+    return [*available_clips(character), *FilesCompleter()(prefix)]
 
 
 def _scenes(prefix: str, **ignored: object) -> Iterable[str]:
@@ -52,7 +54,7 @@ def _settings(parsed_args: argparse.Namespace, **ignored: object) -> Iterable[st
     from actuated_characters.commands.common.settings import CHARACTER, NODES, parameters_of
     from msgs_config.character.loading import load_character
 
-    character = load_character(getattr(parsed_args, "character", CHARACTER))
+    character = load_character(getattr(parsed_args, "character", None) or CHARACTER)
     return [
         f"{node}.{parameter.name}:="
         for node in NODES
