@@ -143,8 +143,12 @@ def _run(options: argparse.Namespace) -> None:
     plot_metrics(directory)
     metrics = describe_metrics(read_metrics(directory)[0])
     Console().print(make_table(f"results in {directory}", ("figure", "value"), metrics))
-    for text, hit in zip(options.throw, hits, strict=True):
-        print(f"throw '{text}': {hit}")
+    own = len(hits) - len(options.throw)  # those of a timeline come first
+    names = [f"throws {number}" for number in range(1, own + 1)]
+    for name, hit in zip(
+        [*names, *(f"throw '{each}'" for each in options.throw)], hits, strict=True
+    ):
+        print(f"{name}: {hit}")
     print(f"a picture of the figures: {directory / PLOT}")
 
 

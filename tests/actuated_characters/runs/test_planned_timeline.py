@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from actuated_characters.bags.recording import read_recording
+from actuated_characters.cli import main
 from actuated_characters.commands.common.planned_run import PlannedRun, planned_run
 from actuated_characters.commands.run import add_run
 from actuated_characters.replay.replay import replay
@@ -48,6 +49,21 @@ def planned(directory: Path, content: dict[str, Any], *options: str) -> PlannedR
 
 def tick(time: float) -> int:
     return CLOCK.stamp_ns(1 + round(time * RATE))
+
+
+@pytest.mark.slow
+def test_the_command_says_of_each_ball_whether_it_has_hit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "moves.yaml"
+    file.write_text(yaml.safe_dump(EVENTFUL), encoding="utf-8")
+    throw = "mass=1 speed=8 at=0.7 target=neck"
+    arguments = ["--timeline", str(file), "--throw", throw, "--output", str(tmp_path / "run")]
+
+    assert main(["run", "--in-process", *arguments]) == 0
+
+    said = capsys.readouterr().out
+    assert "throws 1: " in said and f"throw '{throw}': " in said
 
 
 @pytest.mark.slow
