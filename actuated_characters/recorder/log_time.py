@@ -11,7 +11,7 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 
 _STAMP_AT, _FIRST_STAMP_AT = 4, 8  # bytes before CDR's first field, and a sequence's first element
 _STAMP_TYPES = {"builtin_interfaces/msg/Time", "std_msgs/msg/Header"}
-_SETTLED_NS = 100_000_000  # ns in which all messages of one moment come, also on a busy machine
+_SETTLED = 0.1  # s in which all messages of one moment are read, also on a busy machine
 _MOST_PENDING = 1000  # messages before the first state; few topics have any then
 
 
@@ -28,26 +28,39 @@ class SimulatedLogTime:
         self._last_ns = 0  # stamp of the newest state
         self._pending: list[Heard] = []
         self._places: dict[str, int | None] = {}  # the offset of the stamp by topic
-        self._unsettled: list[Heard] = []
+        self._unsettled: list[tuple[Heard, float]] = []  # with the times of reading, s
 
-    def settle(self, batch: list[Heard], begun_ns: int | None) -> list[Heard]:
-        """Keep the newest messages back for later calls; return the rest in order of publishing.
+    def settle(self, batch: list[Heard], begun: float, read: float) -> list[Heard]:
+        """Keep what was read last for later calls; return the rest in order of publishing.
 
-        Where log times are equal the order of writing counts, and topics are read one by one: of
-        what was published or on its way meanwhile, those that were read first lack the messages.
+        Where log times are equal the order of writing counts, and topics are read one by one: what
+        was published earlier may be on its way still, however long ago that was, for a recorder
+        that stood still for a while finds of some topics all and of others nothing yet.
 
         Args:
             batch: Has been read from all topics.
-            begun_ns: Wall time at which that began; None: keep nothing back.
+            begun: Time at which that began, s; of a clock that is never set.
+            read: Time at which that ended, s.
         """
-        messages = sorted([*self._unsettled, *batch], key=lambda message: message.published_ns)
-        if begun_ns is None:
-            self._unsettled = []
-            return messages
-        latest_ns, now_ns = begun_ns - _SETTLED_NS, time.time_ns()
-        late = [latest_ns < each.published_ns <= now_ns for each in messages]
-        self._unsettled = [each for each, is_late in zip(messages, late, strict=True) if is_late]
-        return [each for each, is_late in zip(messages, late, strict=True) if not is_late]
+        self._unsettled.extend((message, read) for message in batch)
+        self._unsettled.sort(key=lambda each: each[0].published_ns)
+        latest, now_ns = begun - _SETTLED, time.time_ns()
+        old = [message.published_ns for message, at in self._unsettled if at <= latest]
+        # A clock that is ahead settles nobody else's messages.
+        settled_ns = max((each for each in old if each <= now_ns), default=0)
+        settled, unsettled = [], []
+        for message, at in self._unsettled:
+            if at <= latest or message.published_ns <= settled_ns:
+                settled.append(message)
+            else:
+                unsettled.append((message, at))
+        self._unsettled = unsettled
+        return settled
+
+    def settle_rest(self) -> list[Heard]:
+        """Return what was kept back, in order of publishing."""
+        rest, self._unsettled = [message for message, _ in self._unsettled], []
+        return rest
 
     def take(self, message: Heard) -> Iterator[tuple[Heard, int]]:
         """Yield the messages whose log times (ns) are known now, with these, in their order."""

@@ -87,12 +87,16 @@ class RecorderNode(DdsNode):
     def _drain_rest(self) -> None:
         """Take the messages that were there at the stop, within a reasonable time."""
         deadline = time.monotonic() + _LONGEST_END
-        for _ in range(LISTENING_DEPTH // _AT_ONCE):  # more messages cannot have waited
-            if not self._drain(gives_way=False):
-                return
-            if time.monotonic() > deadline:
+        rounds = LISTENING_DEPTH // _AT_ONCE  # more messages cannot have waited
+        while more := self._drain(gives_way=False):
+            rounds -= 1
+            if rounds == 0 or time.monotonic() > deadline:
                 break
-        self.get_logger().warning("messages still came at the end; the last ones are not recorded")
+        if more:
+            self.get_logger().warning("messages still came at the end; the last are not recorded")
+        if self._recorder.log_time is not None:
+            for message in self._recorder.log_time.settle_rest():
+                self._recorder.take(message)
 
     def _search(self) -> float:
         """Record topics whose first publisher has come; returns when to look again, s."""
@@ -120,17 +124,18 @@ class RecorderNode(DdsNode):
         While the loop runs the nodes in it go first; at the end the recorder does not give way,
         or a flood from others would hold it up.
         """
-        begun_ns = time.time_ns()
+        begun = time.monotonic()
         batch = [
             Heard(reader.recorded, raw, published_ns)
             for reader in self._readers
             for published_ns, raw in reader.take(_AT_ONCE)
         ]
+        read = len(batch)
         if self._recorder.log_time is None:
             batch.sort(key=lambda message: message.published_ns)
         else:
-            batch = self._recorder.log_time.settle(batch, begun_ns if gives_way else None)
+            batch = self._recorder.log_time.settle(batch, begun, time.monotonic())
         for message in batch:
             if self._recorder.take(message) and gives_way:
                 os.sched_yield()
-        return len(batch)
+        return read
