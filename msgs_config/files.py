@@ -3,7 +3,7 @@
 import codecs
 import importlib.util
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from copy import deepcopy
 from functools import lru_cache
@@ -21,9 +21,9 @@ with suppress(ImportError):  # there may be no ROS
     from ament_index_python.packages import get_package_share_directory as _find_in_ros
 
 MAX_FILE_BYTES = 16 * 1024 * 1024
-MAX_YAML_CHARACTERS = 128 * 1024  # PyYAML is slow: a second for as much
+MAX_YAML_CHARACTERS = 128 * 1024
 MAX_XML_CHARACTERS = 2 * 1024 * 1024
-MAX_XML_NESTING = 64
+MAX_XML_NESTING = MAX_YAML_NESTING = 64  # levels
 _PACKAGE = "package://"
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _REMEDIES = {
@@ -189,15 +189,33 @@ def parse_yaml(
     if len(text) > most:
         raise error(f"{place}: larger than {most >> 10} KiB")
     try:
-        return _PlainLoader(text).get_single_data()
-    except RecursionError as cause:
-        raise error(f"{place}: not valid YAML: nested too deep") from cause
+        content = _PlainLoader(text).get_single_data()
     except (yaml.YAMLError, ValueError) as cause:  # ValueError: a number of too many digits
         where = getattr(cause, "problem_mark", None)
         line = f", line {where.line + 1}" if where is not None else ""
         problem = getattr(cause, "problem", None)
         reason = f": {problem[:200]}" if problem else ""
         raise error(f"{place}{line}: not valid YAML{reason}") from cause
+    if _nests_too_deep(content):
+        raise error(f"{place}: not valid YAML: nested too deep")
+    return content
+
+
+def _nests_too_deep(content: object) -> bool:
+    """Whether a value has too many levels, or is within itself: who reads it calls itself."""
+    level = [content]
+    for _ in range(MAX_YAML_NESTING):
+        children = [child for each in level for child in _children(each)]
+        level = list({id(child): child for child in children}.values())  # an alias counts once
+        if not level:
+            return False
+    return True
+
+
+def _children(content: object) -> Iterable[object]:
+    if isinstance(content, dict):
+        return content.values()
+    return content if isinstance(content, list) else ()
 
 
 _TAG = "tag:yaml.org,2002:"
@@ -208,7 +226,7 @@ _NUMBERS = {  # the forms of numbers in YAML 1.2 and JSON
 }
 
 
-class _PlainLoader(yaml.SafeLoader):
+class _PlainLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """Plain data alone.
 
     PyYAML follows YAML 1.1, where `1e-1` is a text, `010` is eight and `1:30` ninety. Here they

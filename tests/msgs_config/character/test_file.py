@@ -465,7 +465,7 @@ REFUSED = {
     "a list": ("- urdf: lift.urdf", ["mapping"]),
     "a text": ("lift.urdf", ["mapping"]),
     "two documents": (PREAMBLE + "---\n" + PREAMBLE, []),
-    "a value that holds itself": (PREAMBLE + "scale: &a [*a]", ["scale"]),
+    "a value that holds itself": (PREAMBLE + "scale: &a [*a]", ["nested too deep"]),
     "an anchor that is not there": (PREAMBLE + "scale: *a", []),
     "no URDF": ("fixed_base: true", ["urdf"]),
     "a URDF that is no text": ("urdf: 3", ["urdf", "3"]),
