@@ -129,11 +129,12 @@ def first_difference(before: TimelineRun, run: TimelineRun) -> int | None:
     if before.plan.ticks != run.plan.ticks:
         changes.append(ticks - 1)
     clock = TickClock(run.plan.simulation.rate_hz)
-    motions = before.plan.reference, run.plan.reference
-    for tick in range(min([ticks, *changes]) + ahead):
-        if not _is_same(*motions, clock.time_after(tick)):
-            changes.append(max(tick - ahead, 0))
-            break
+    motions = before.reference, run.reference
+    if not motions[0].is_motion_of(motions[1]):
+        for tick in range(min([ticks, *changes]) + ahead):
+            if not _is_same(*motions, clock.time_after(tick)):
+                changes.append(max(tick - ahead, 0))
+                break
     return min(changes, default=None)
 
 

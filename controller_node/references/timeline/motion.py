@@ -1,5 +1,7 @@
 """The reference `timeline`: the motion of a timeline's file."""
 
+import pickle
+
 from controller_node.references.base import REFERENCES, Motion, Reference, ReferenceState
 from controller_node.references.steering import factory  # noqa: F401  registers what it steers
 from controller_node.references.timeline.description import Timeline
@@ -38,6 +40,10 @@ class TimelineReference(OnePart):
     def __getstate__(self) -> dict[str, object]:
         """All but the states that are known: they are sampled again."""
         return vars(self) | {"_known": {}}
+
+    def is_motion_of(self, other: "TimelineReference") -> bool:
+        """Whether both move alike to the bit; some that do may not be recognised."""
+        return pickle.dumps(self._motion) == pickle.dumps(other._motion)
 
     def sample(self, time: float) -> ReferenceState:
         """The desired state `time` seconds after the episode's first state."""
