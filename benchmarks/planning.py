@@ -118,7 +118,7 @@ class _World:
         states = [self._plan.reference.sample(each) for each in times]
         positions = [self._model.position_of(each.configuration.position) for each in states]
         velocities = [each.velocity for each in states]
-        return Desired(0, _HORIZON, 0, _CHECK, np.array(positions), np.array(velocities))
+        return Desired(0, 1, _HORIZON, 0, _CHECK, np.array(positions), np.array(velocities))
 
     def _centres(self, moment: float) -> Iterator[FloatArray]:
         """Where the centre of mass is in the simulator, tick after tick."""

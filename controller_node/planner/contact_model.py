@@ -45,7 +45,7 @@ _BY_PAIRS = {"contype": 0, "conaffinity": 0}  # explicit pairs say which shapes 
 
 
 class ContactModel:
-    """A character with a floating base on the ground, simulated tick by tick.
+    """A character with a floating base on the ground, simulated step by step.
 
     Positions are MuJoCo's (q,): rotations as quaternions wxyz; velocities (n,) are the layout's.
     """
@@ -80,11 +80,13 @@ class ContactModel:
         self._limits = self._find_limits()
 
     @classmethod
-    def of(cls, character: Character, given: PlannerParameters) -> "ContactModel":
-        """The model that a planner's parameters say."""
+    def of(
+        cls, character: Character, given: PlannerParameters, step_ticks: int = 1
+    ) -> "ContactModel":
+        """The model that a planner's parameters say, whose step is so many ticks."""
         return cls(
             character,
-            period_s=1.0 / given.rate_hz,
+            period_s=step_ticks / given.rate_hz,
             gravity=given.gravity,
             friction=given.friction,
             contact=given.contact,

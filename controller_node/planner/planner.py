@@ -84,7 +84,10 @@ class PredictivePlanner:
         self._made_of = (character, settings)
         self.settings, given = settings, settings.parameters
         self._model = ContactModel.of(character, given)
-        self._rollouts = RolloutPool(self._model, given.threads)
+        self._stepped = (  # what plans are tried in
+            self._model if settings.step == 1 else ContactModel.of(character, given, settings.step)
+        )
+        self._rollouts = RolloutPool(self._stepped, given.threads, self._model)
         self.in_flight = (
             CommandsInFlight(character, self._model, given.delay) if given.delay else None
         )
@@ -221,8 +224,8 @@ class PredictivePlanner:
         assert self._coming is None
         body, position = self._model.body(gains), self._model.position_of(state.position)
         desired = self._reference.ahead(tick, desired_at, body)
-        velocity = state.velocity.copy()
-        start = Start(tick, position, velocity, desired, body, Anchor(), perturbed=False)
+        velocity, stepped = state.velocity.copy(), self._stepped.body(gains)
+        start = Start(tick, position, velocity, desired, stepped, Anchor(), perturbed=False)
         return self._search.cost_ahead(start, self._plan)
 
     def _compile(self, character: Character) -> None:
@@ -234,8 +237,9 @@ class PredictivePlanner:
         body = self._model.body(gains)
         desired = self._reference.ahead(0, lambda _: still, body)
         position = self._model.position_of(rest)
+        stepped = self._stepped.body(gains)
         self._search.rehearse(
-            Start(0, position, nothing, desired, body, self.anchor, perturbed=False)
+            Start(0, position, nothing, desired, stepped, self.anchor, perturbed=False)
         )
         self._reference.clear()
 
@@ -288,7 +292,8 @@ class PredictivePlanner:
             )
         desired = self._reference.ahead(acts, desired_at, body)
         perturbed = self.anchor.is_perturbed(tick / self._rate_hz)
-        start = Start(tick, position, velocity, desired, body, self.anchor, perturbed)
+        stepped = self._stepped.body(gains)
+        start = Start(tick, position, velocity, desired, stepped, self.anchor, perturbed)
         seed, guess, self._guess = (self._seed, self._episode), self._guess, None
         return PendingPlan(
             tick, acts, self._thread.submit(self._search.find, start, self._plan, seed, guess)

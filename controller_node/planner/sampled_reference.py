@@ -64,10 +64,10 @@ class SampledReference:
         settings = self._settings
         for known in [known for known in self._targets if known < tick]:
             del self._targets[known]
-        ticks = range(tick, tick + settings.horizon + 1)
+        ticks = range(tick, tick + settings.horizon + 1, settings.step)
         targets = [self.target(each, desired_at, body) for each in ticks]
-        desired = self._desired(tick, targets, tick // settings.knots)
-        checked = targets[settings.period :: settings.period]
+        desired = self._desired(tick, settings.step, targets, tick // settings.knots)
+        checked = targets[desired.check_steps :: desired.check_steps]
         return Foreseen(desired, np.array([target.features for target in checked]))
 
     def between(
@@ -75,14 +75,17 @@ class SampledReference:
     ) -> Desired:
         """The reference from one tick to another, for offsets whose first knot is given."""
         targets = [self.target(each, desired_at, body) for each in range(first, last + 1)]
-        return self._desired(first, targets, first_knot)
+        return self._desired(first, 1, targets, first_knot)
 
-    def _desired(self, tick: int, targets: Sequence[ReferenceSample], first_knot: int) -> Desired:
+    def _desired(
+        self, tick: int, step: int, targets: Sequence[ReferenceSample], first_knot: int
+    ) -> Desired:
         return Desired(
             tick,
+            step,
             self._settings.knots,
             first_knot,
-            self._settings.period,
+            self._settings.period // step,
             np.array([target.position for target in targets]),
             np.array([target.velocity for target in targets]),
         )

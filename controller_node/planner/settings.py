@@ -75,6 +75,14 @@ class PlannerParameters(Settings, prefix="plan."):
     knots: float = parameter(
         0.15, "from one knot of a plan to the next", unit="s", minimum=0.01, maximum=5
     )
+    step: float = parameter(
+        0.0,
+        "longest step of the model that plans are tried in; a tick of the world at least: two of "
+        "240 Hz (0.009) take half of the time, and foresee a bit less",
+        unit="s",
+        minimum=0.0,
+        maximum=0.05,
+    )
     samples: int = parameter(
         16, "rollouts of a round in which a plan is sought", minimum=8, maximum=10_000
     )
@@ -126,7 +134,8 @@ class PlannerSettings:
 
     parameters: PlannerParameters
     horizon: int  # a whole number of periods
-    period: int
+    period: int  # a whole number of steps
+    step: int
     knots: int
     sigma: FloatArray  # (n - 6,) rad or m
 
@@ -170,9 +179,20 @@ def make_planner_settings(character: Character, values: Values) -> PlannerSettin
         parameters=given,
         horizon=horizon - horizon % period,
         period=period,
+        step=_step(given, period),
         knots=knots,
         sigma=_sigma(character),
     )
+
+
+def _step(given: PlannerParameters, period: int) -> int:
+    """The ticks of a step: as many as divide a period, and are no longer than is said."""
+    within = [
+        ticks
+        for ticks in range(1, period + 1)
+        if period % ticks == 0 and ticks <= given.step * given.rate_hz
+    ]
+    return max(within, default=1)
 
 
 def check_world(values: Values, simulator: Mapping[str, object]) -> None:

@@ -1,4 +1,4 @@
-"""One rollout: the law and the model of the world, tick after tick, without Python in between."""
+"""One rollout: the law and the model of the world, step after step, without Python in between."""
 
 import math
 from typing import NamedTuple
@@ -64,11 +64,12 @@ class Desired(NamedTuple):
     """The reference over the horizon, and how the offsets are laid over it."""
 
     first_tick: int  # the horizon's first tick, since the episode began
+    step_ticks: int  # ticks from one step of the model to the next
     knot_ticks: int  # ticks from one knot to the next
     first_knot: int  # number of the first knot that is given
-    check_ticks: int  # ticks from one check to the next
-    positions: FloatArray  # (ticks + 1, q) as MuJoCo has them
-    velocities: FloatArray  # (ticks + 1, n)
+    check_steps: int  # steps from one check to the next
+    positions: FloatArray  # (steps + 1, q) as MuJoCo has them
+    velocities: FloatArray  # (steps + 1, n)
 
 
 @compiled
@@ -98,15 +99,16 @@ def roll_out(
     room = Room(np.empty(n), np.empty(n), np.empty(n), engine.law_mass)
     bounds = _room_for_bounds(MOST_BOUNDS, n)
     begin(start_position, start_velocity, engine)
-    ticks = len(desired.positions) - 1
-    for tick in range(ticks + 1):
+    steps = len(desired.positions) - 1
+    for step in range(steps + 1):
         mj.step_before_forces(engine.model, engine.data)
-        check, since_check = divmod(tick, desired.check_ticks)
+        check, since_check = divmod(step, desired.check_steps)
         if check and not since_check:
-            write_check(features[check - 1], desired.positions[tick], body, engine)
-        if tick < ticks:
-            _set_offset(room.error, knots, desired.first_tick + tick, desired)
-            target, target_velocity = desired.positions[tick + 1], desired.velocities[tick + 1]
+            write_check(features[check - 1], desired.positions[step], body, engine)
+        if step < steps:
+            tick = desired.first_tick + step * desired.step_ticks
+            _set_offset(room.error, knots, tick, desired)
+            target, target_velocity = desired.positions[step + 1], desired.velocities[step + 1]
             apply_law(target, target_velocity, body, engine, room, bounds)
             if not is_bounded(engine):
                 return False  # before MuJoCo writes a warning

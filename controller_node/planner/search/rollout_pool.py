@@ -23,10 +23,15 @@ _MAX_FEATURE = 1e4  # the largest feature; beyond it a rollout has come to nothi
 class RolloutPool:
     """Threads with an engine each."""
 
-    def __init__(self, model: ContactModel, workers: int) -> None:
-        """The thread that asks is one of the workers."""
+    def __init__(
+        self, model: ContactModel, workers: int, of_ticks: ContactModel | None = None
+    ) -> None:
+        """The thread that asks is one of the workers.
+
+        Where a step of the model is several ticks, `of_ticks` is one whose step is a tick.
+        """
         self._model = model
-        self._own = model.engine()  # the engine of single states, in the thread that asks for them
+        self._own = (of_ticks or model).engine()  # of single states, in the thread that asks
         self._threads = WorkerThreads([model.engine() for _ in range(workers)])
 
     def features_of(
@@ -46,7 +51,7 @@ class RolloutPool:
         body: RolloutModel,
     ) -> tuple[FloatArray, FloatArray]:
         """The state, (q,) and (n,), to which offsets lead; the same one if they lead to nothing."""
-        unchecked = desired._replace(check_ticks=len(desired.positions))
+        unchecked = desired._replace(check_steps=len(desired.positions))
         nothing = np.zeros((0, self._model.feature_count))
         assert _has_knots(offsets.rows, desired)
         if not roll_out(nothing, position, velocity, offsets.rows, unchecked, body, self._own):
@@ -65,9 +70,8 @@ class RolloutPool:
 
         The features of those that did not are zero.
         """
-        ticks = len(desired.positions) - 1
         assert _has_knots(plans[0], desired)
-        checks = ticks // desired.check_ticks
+        checks = (len(desired.positions) - 1) // desired.check_steps
         features = np.zeros((len(plans), checks, self._model.feature_count))
         sound = np.zeros(len(plans), dtype=np.bool_)
 
@@ -85,7 +89,7 @@ class RolloutPool:
 
 def _has_knots(rows: FloatArray, desired: Desired) -> bool:
     """Whether the knots (k, n - 6) are there, for which compiled code does not look."""
-    last_tick = desired.first_tick + len(desired.positions) - 2
+    last_tick = desired.first_tick + (len(desired.positions) - 2) * desired.step_ticks
     first, _ = knot_before(desired.first_tick, desired.knot_ticks)
     last, _ = knot_before(last_tick, desired.knot_ticks)
     return desired.first_knot <= first and last + 2 - desired.first_knot <= len(rows)

@@ -132,7 +132,9 @@ def test_costs_are_the_same_whichever_way_the_reference_faces(stage: Stage) -> N
 def test_without_answers_a_world_is_the_planners_without_a_plan(stage: Stage) -> None:
     table, decisions = stage.table, 6
     ticks = decisions * stage.worlds.rules.hold
-    desired = Desired(0, ticks, 0, 1, table.positions[: ticks + 1], table.velocities[: ticks + 1])
+    desired = Desired(
+        0, 1, ticks, 0, 1, table.positions[: ticks + 1], table.velocities[: ticks + 1]
+    )
     offsets = Offsets(ticks, 0, np.zeros((2, N - 6)))
     pool = RolloutPool(stage.worlds.model, 1)
 

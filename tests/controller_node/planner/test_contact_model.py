@@ -51,7 +51,9 @@ def desired(reference: ClipReference, tick: int) -> tuple[Desired, list[Referenc
     states = [reference.sample((tick + each) / RATE) for each in range(HORIZON + 1)]
     positions = [MODEL.position_of(state.configuration.position) for state in states]
     velocities = [state.velocity for state in states]
-    course = Desired(tick, KNOTS, tick // KNOTS, CHECKS, np.array(positions), np.array(velocities))
+    course = Desired(
+        tick, 1, KNOTS, tick // KNOTS, CHECKS, np.array(positions), np.array(velocities)
+    )
     return course, states
 
 
@@ -187,6 +189,26 @@ def test_a_rollout_depends_on_its_own_plan_alone() -> None:
     for workers in (1, 2, 4):
         together, _ = RolloutPool(MODEL, workers).simulate(start, velocity, plans, course, body)
         assert together.tobytes() == np.array(alone).tobytes()
+
+
+def test_steps_of_several_ticks_are_ticks_of_a_slower_clock() -> None:
+    course, states = desired(clip("walk"), 70)
+    position, velocity = start_of(states)
+    model = ContactModel(HUMANOID, period_s=2 * PERIOD, gravity=9.81, friction=0.45)
+    every_other = course._replace(
+        positions=course.positions[::2], velocities=course.velocities[::2], check_steps=CHECKS // 2
+    )
+    stepped = every_other._replace(step_ticks=2)
+    slower = every_other._replace(first_tick=35, knot_ticks=KNOTS // 2)
+    plans = 0.3 * np.random.default_rng(3).normal(size=(2, 6, N - 6))
+    body, start = model.body(gains()), model.position_of(position)
+
+    found, sound = RolloutPool(model, 1, MODEL).simulate(start, velocity, plans, stepped, body)
+    expected, _ = RolloutPool(model, 1).simulate(start, velocity, plans, slower, body)
+
+    assert sound.all()
+    assert found.shape[1] == HORIZON // CHECKS
+    assert found.tobytes() == expected.tobytes()
 
 
 def test_a_rollout_that_comes_to_nothing_harms_no_other() -> None:

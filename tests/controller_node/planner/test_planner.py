@@ -27,6 +27,7 @@ from controller_node.planner.outlook import Outlook
 from controller_node.planner.search import gauss_newton
 from controller_node.planner.search.plan_search import PlanSearch
 from controller_node.planner.search.round import LeastSquaresProblem, improve
+from controller_node.planner.settings import make_planner_settings
 from controller_node.references.factory import make_motion
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -414,9 +415,12 @@ def test_runs_that_are_planned_have_contacts_that_keep_their_points(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("duration", [0.6, pytest.param(1.2667, marks=pytest.mark.nightly)])
-def test_a_walk_goes_on_by_its_joints_alone(duration: float) -> None:
-    settings = {"planner": "predictive"}
+@pytest.mark.parametrize(
+    ("duration", "step"),
+    [(0.6, 0.0), (0.6, 0.009), pytest.param(1.27, 0.0, marks=pytest.mark.nightly)],
+)
+def test_a_walk_goes_on_by_its_joints_alone(duration: float, step: float) -> None:
+    settings = {"planner": "predictive", "plan.step": step}
     plan = make_plan("humanoid", duration, {"reference": "clip", "clip": "walk"}, {}, settings)
     layout = HUMANOID.layout
 
@@ -510,6 +514,22 @@ def test_what_it_cannot_do_is_one_clear_line(case: str) -> None:
 
     assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("rate", "longest", "ticks"),
+    [(240, 0.0, 1), (240, 0.009, 2), (480, 0.009, 4), (100, 0.009, 1), (240, 0.021, 4)],
+)
+def test_a_step_of_its_model_is_as_many_ticks_as_divide_a_period(
+    rate: int, longest: float, ticks: int
+) -> None:
+    humanoid = character("humanoid")
+    given = {"planner": "predictive", "rate": rate, "plan.step": longest}
+
+    settings = make_planner_settings(humanoid, resolve_for(humanoid, given))
+
+    assert settings.step == ticks
+    assert settings.period % ticks == 0
 
 
 def test_it_knows_no_ground_but_the_plane() -> None:
