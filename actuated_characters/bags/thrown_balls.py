@@ -37,7 +37,7 @@ def _of_episode(recording: Recording, begin: int, end: int) -> tuple[ThrownBall,
         for throw in throws
     ]
     earlier = _count_earlier(recording, begin, end)
-    names = ball_names(earlier + len(thrown))[earlier:]
+    names = ball_names([throw for _, throw in thrown], earlier + 1)
     return tuple(ThrownBall(name, *each) for name, each in zip(names, thrown, strict=True))
 
 

@@ -89,7 +89,8 @@ def add_run(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--throw",
         "'mass=KG speed=M/S at=S target=LINK'",
         "a ball that hits a link, where the reference has it, at a time in s; from=front, left, "
-        "right, back, above or degrees (front), distance=M (2), radius=M",
+        "right, back, above or degrees (front), distance=M (2), radius=M; shape=box "
+        "size=LENGTHxWIDTHxHEIGHT (m), with slide=true along the ground",
     )
     add_loop(run)
     add_viewed(run)

@@ -1,5 +1,7 @@
 """A scene of characters and balls that move, as glTF: each link is a node below its parent."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from actuated_characters.export.gltf_ground import add_ground
@@ -20,7 +22,7 @@ from character_motion.export.upright import UPRIGHT_XYZW
 from character_motion.gltf.document import GltfDocument
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Quadruple, Shape, ShapeType
+from msgs_config.character.model import Quadruple, Shape
 from msgs_config.geometry import rotations
 from msgs_config.geometry.surface import Surface
 
@@ -116,7 +118,7 @@ class _SceneBuilder:
         rows = np.maximum.accumulate(np.where(there, np.arange(len(there)), np.argmax(there)))
         centres, turns = ball.centres[rows], continuous(ball.turns_xyzw[rows])
         sizes = np.repeat(there.astype(float)[:, np.newaxis], 3, axis=1)
-        shape = Shape(ShapeType.SPHERE, (ball.radius,), color_rgba=_BALL_RGBA)
+        shape = replace(ball.shape, color_rgba=_BALL_RGBA)
         node = self.document.add_node(
             ball.name,
             self._world,

@@ -126,11 +126,11 @@ def _balls(scene: RecordedScene) -> Iterator[BallTrajectory]:
     for number, (begin, end) in enumerate(pairwise(ends), start=1):
         known = {row: each for row in range(begin, end) if (each := states[row]) is not None}
         names = list(dict.fromkeys(name for each in known.values() for name in each.names))
-        radii = scene.ball_radii(end - 1, len(names))
+        shapes = scene.ball_shapes(end - 1, names)
         poses = np.full((len(names), len(states), 7), np.nan)
         for row, each in known.items():
             poses[[names.index(name) for name in each.names], row] = each.motion[:, :7]
         poses[np.linalg.norm(poses[..., :3], axis=-1) > _AWAY_DISTANCE] = np.nan
         prefix = f"episode_{number}_" if len(ends) > 2 else ""
-        for name, radius, pose in zip(names, radii, poses, strict=True):
-            yield BallTrajectory(prefix + name, radius, pose[:, :3], pose[:, 3:])
+        for name, shape, pose in zip(names, shapes, poses, strict=True):
+            yield BallTrajectory(prefix + name, shape, pose[:, :3], pose[:, 3:])

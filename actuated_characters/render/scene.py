@@ -14,13 +14,13 @@ from actuated_characters.render.engine.renderer import FrameSpec
 from actuated_characters.render.pushed_stills import Ticks
 from actuated_characters.render.skin.palette import color_number
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
-from msgs_config.character.model import Character, UrdfOptions
+from msgs_config.character.model import Character, Pose, Shape, ShapeType, UrdfOptions
 from msgs_config.errors import ConfigurationError, RecordingError
-from msgs_config.messages.projectiles import ball_names
+from msgs_config.geometry import rotations
 from msgs_config.messages.wrenches import WrenchArrays
 from msgs_config.shared_parameters import PLANE
 
-_RADIUS = 0.1  # m, of a ball whose radius was not recorded
+_UNKNOWN = Shape(ShapeType.SPHERE, (0.1,))  # of what was thrown before the recording begins
 _SHORTEST_ARROW = 0.25  # length of the shortest arrow, as a share of the longest one's
 _OF_STATES = (
     *("stamps_ns", "published_ns", "position", "velocity"),
@@ -130,19 +130,24 @@ class RecordedScene:
             for part in np.split(ticks, np.flatnonzero(np.diff(ticks) > 1) + 1)
         ]
 
-    def _balls(self, row: int) -> FloatArray | None:
-        """Centres and radii (m, 4) of the balls that are there in a state, m; None: no balls."""
+    def _balls(self, row: int) -> list[Shape]:
+        """The balls and boxes that are there in a state, with their poses in the world."""
         recording = self.recordings[0]
         states = recording.balls[row] if recording.balls else None
         if states is None:
-            return None
-        return np.column_stack((states.motion[:, :3], self.ball_radii(row, len(states.names))))
+            return []
+        shapes = self.ball_shapes(row, states.names)
+        return [
+            # How a ball is turned is not seen, but by the triangles that it is drawn with.
+            replace(shape, pose=Pose.of_arrays(pose[:3], _turn(shape, pose[3:])))
+            for shape, pose in zip(shapes, states.motion[:, :7], strict=True)
+        ]
 
-    def ball_radii(self, row: int, count: int) -> list[float]:
-        """Radii of the balls that are there in a state, m, so many of them."""
+    def ball_shapes(self, row: int, names: Sequence[str]) -> list[Shape]:
+        """The shapes of balls and boxes that are there in a state, by their names."""
         first = int(self.episode_rows[np.searchsorted(self.episode_rows, row, side="right") - 1])
-        radii = {each.name: each.throw.radius for each in self._thrown.get(first, ())}
-        return [radii.get(name, _RADIUS) for name in ball_names(count)]
+        shapes = {each.name: each.throw.shape for each in self._thrown.get(first, ())}
+        return [shapes.get(name, _UNKNOWN) for name in names]
 
     @cached_property
     def _thrown(self) -> dict[int, tuple[ThrownBall, ...]]:
@@ -240,6 +245,10 @@ def _ticks(rows: IntArray) -> Iterator[tuple[int, int]]:
     for row in rows.tolist():
         yield min(before, max(row - 1, 0)), row
         before = row
+
+
+def _turn(shape: Shape, turn_xyzw: FloatArray) -> FloatArray:
+    return np.array(rotations.IDENTITY_XYZW) if shape.type is ShapeType.SPHERE else turn_xyzw
 
 
 def _norms(acting: WrenchArrays) -> FloatArray:

@@ -80,10 +80,9 @@ def throw_events(recording: Recording) -> list[Event]:
     for ball in chain(*thrown_balls(recording).values()):
         throw = ball.throw
         speed = float(np.linalg.norm(throw.velocity))
-        text = (
-            f"{ball.name} thrown: {throw.mass:.4g} kg, radius {throw.radius:.3g} m, {speed:.4g} m/s"
-        )
-        facts = {"mass": throw.mass, "radius": throw.radius, "speed": speed}
+        text = f"{ball.name} thrown: {throw.mass:.4g} kg, {throw.describe_size()}, {speed:.4g} m/s"
+        size = {"radius": throw.radius} if throw.size is None else {"size": list(throw.size)}
+        facts = {"mass": throw.mass, **size, "speed": speed}
         events.append(Event(THROW, float(times[ball.tick]), text=text, facts=facts))
     return events
 

@@ -9,7 +9,7 @@ import numpy as np
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition
-from msgs_config.character.model import Character
+from msgs_config.character.model import Character, Shape
 from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
@@ -33,10 +33,10 @@ class CharacterTrajectory:
 
 @dataclass(frozen=True)
 class BallTrajectory:
-    """Where a ball is at t times; NaN while it is not in the world."""
+    """Where a ball or box is at t times; NaN while it is not in the world."""
 
     name: str
-    radius: float  # m
+    shape: Shape
     centres: FloatArray  # (t, 3) m, world
     turns_xyzw: FloatArray  # (t, 4)
 
@@ -128,6 +128,6 @@ class Trajectories:
         """The balls at some times (f,) in s, each as it is in the state nearest to it."""
         rows = nearest_rows(self.times, times)
         return tuple(
-            BallTrajectory(each.name, each.radius, each.centres[rows], each.turns_xyzw[rows])
+            BallTrajectory(each.name, each.shape, each.centres[rows], each.turns_xyzw[rows])
             for each in self.balls
         )

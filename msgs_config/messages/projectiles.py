@@ -1,10 +1,13 @@
 """Balls as messages: how one is thrown, as `sensor_msgs/JointState`, and where those thrown are.
 
 In a throw `name` has `mass`, `radius`, `x`, `y`, `z`, `vx`, `vy`, `vz`, and `position` their values
-in kg, m and m/s, world axes; everything else in the message is unused. Where the balls are says
-`sensor_msgs/MultiDOFJointState`: their poses in `transforms`, their velocities in `twist`.
+in kg, m and m/s, world axes; everything else in the message is unused. A box, which is a ball of
+another shape to all who handle them, has `size_x`, `size_y`, `size_z` in m in place of the radius,
+and may have `yaw` in rad. Where the balls are says `sensor_msgs/MultiDOFJointState`: their poses in
+`transforms`, their velocities in `twist`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +22,7 @@ from msgs_config.messages.cdr import (
     with_stamp,
 )
 from msgs_config.messages.joint_state import JointStateDecoder, JointStateEncoder
-from msgs_config.messages.throw import NUMBERS, ProjectileThrow, parse_throw
+from msgs_config.messages.throw import BOX_NUMBERS, NUMBERS, ProjectileThrow, parse_throw
 from msgs_config.messages.wrenches import NO_ROWS
 
 
@@ -38,12 +41,14 @@ class ThrowCodec:
 
     def __init__(self, frame_id: str = "") -> None:
         """`frame_id` is that of what it encodes."""
-        self._encoder = JointStateEncoder(NUMBERS, frame_id)
+        self._encoders: dict[tuple[str, ...], JointStateEncoder] = {
+            names: JointStateEncoder(names, frame_id) for names in (NUMBERS, BOX_NUMBERS)
+        }
         self._decoder = JointStateDecoder()
 
     def encode(self, stamp_ns: int, throw: ProjectileThrow) -> bytes:
         """The serialised message."""
-        return self._encoder.encode(stamp_ns, throw.numbers())
+        return self._encoders[throw.names].encode(stamp_ns, throw.numbers())
 
     def decode(self, raw: bytes) -> tuple[int, ProjectileThrow]:
         """Stamp in ns and throw of a serialised message.
@@ -56,9 +61,15 @@ class ThrowCodec:
         return arrays.stamp_ns, parse_throw(arrays.names, arrays.position.tolist())
 
 
-def ball_names(count: int) -> tuple[str, ...]:
-    """The names of an episode's balls, in the order in which they were thrown."""
-    return tuple(f"ball_{number}" for number in range(1, count + 1))
+def ball_names(throws: Sequence[ProjectileThrow], first: int = 1) -> tuple[str, ...]:
+    """The names of an episode's balls and boxes, in the order in which they were thrown.
+
+    They are numbered together, from `first` on.
+    """
+    return tuple(
+        f"{'ball' if throw.size is None else 'box'}_{number}"
+        for number, throw in enumerate(throws, start=first)
+    )
 
 
 def encode_balls(balls: BallStates, frame_id: str = WORLD) -> bytes:

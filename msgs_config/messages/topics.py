@@ -149,7 +149,8 @@ THROW = Topic(
     content=(
         "a ball to throw: `name` has `mass`, `radius`, `x`, `y`, `z`, `vx`, `vy`, `vz`, "
         "`position` their values (kg, m, m/s, world); without `radius` the ball has that of "
-        "500 kg/m³"
+        "500 kg/m³; with `size_x`, `size_y`, `size_z` (m) in its place a box, turned by `yaw` "
+        "(rad about z; 0 if left out)"
     ),
 )
 APPLIED_THROW = Topic(
@@ -160,7 +161,7 @@ APPLIED_THROW = Topic(
     of_world=True,
     session=SessionPlace.FRAME_ID,
     content=(
-        "a ball released at the beginning of the previous tick, with all its numbers; only "
+        "a ball or box released at the beginning of the previous tick, with all its numbers; only "
         "when there was one"
     ),
 )
@@ -172,7 +173,8 @@ THROWN = Topic(
     of_world=True,
     session=SessionPlace.FRAME_ID,
     content=(
-        "centre, orientation and velocities of the balls `ball_1`, ...; every tick while "
+        "centre, orientation and velocities of the balls and boxes `ball_1`, `box_2`, ... in the "
+        "order of their throws; every tick while "
         "there are any. With several characters, `throw`, `applied_throw` and `thrown` "
         "belong to the world, without a character's name"
     ),

@@ -5,6 +5,7 @@ A message is filled and serialised once, with numbers in it that are found again
 
 import struct
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ class MarkerEncoder:
         The markers of the balls are numbered on from the character's.
         """
         shapes = self._shapes + [
-            (row, Shape(ShapeType.SPHERE, (throw.radius,), color_rgba=_BALL_RGBA))
+            (row, replace(throw.shape, color_rgba=_BALL_RGBA))
             for row, throw in enumerate(throws, start=self._links)
         ]
         self._throws, self._deletes = throws, gone > 0

@@ -72,7 +72,7 @@ class WorldInterface:
 
     def _encode_balls(self) -> bytes:
         simulation = self._simulation
-        names = ball_names(len(simulation.balls))
+        names = ball_names(simulation.balls)
         balls = BallStates(simulation.stamp_ns, names, simulation.ball_motion())
         return encode_balls(balls, self._own_session.session)
 

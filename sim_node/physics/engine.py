@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 from msgs_config.arrays import BoolArray, FloatArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
+from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.throw import ProjectileThrow
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Body(Protocol):
 
 
 class Balls(Protocol):
-    """The balls of a world, solid spheres, in the order in which they were thrown."""
+    """The balls and boxes of a world, in the order in which they were thrown; all are solid."""
 
     @property
     def throws(self) -> tuple[ProjectileThrow, ...]:
@@ -100,8 +101,13 @@ class Balls(Protocol):
     def put_away(self, ball: int) -> None:
         """Put a ball, by its place in the order, far away: on the ground, where that is a plane."""
 
-    def place(self, ball: int, centre: FloatArray | Sequence[float]) -> None:
-        """Put the centre of a ball, by its place in the order, to a point (3,), m."""
+    def place(
+        self,
+        ball: int,
+        centre: FloatArray | Sequence[float],
+        turn_xyzw: FloatArray | Sequence[float] = IDENTITY_XYZW,
+    ) -> None:
+        """Put the centre of a ball, by its place in the order, to a point (3,), m, turned (4,)."""
 
     def set_motion(self, motion: FloatArray) -> None:
         """Give the balls a motion (m, 13), as `motion` returns it."""

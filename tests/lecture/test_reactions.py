@@ -66,7 +66,7 @@ def test_a_ball_that_hits_nothing_loses_no_momentum(runner: InProcessRunner) -> 
     falls = np.zeros((len(run.times), 13))
     falls[:, 7], falls[:, 9] = 2.0, -GRAVITY * run.times
     states = [
-        BallStates(stamp, ball_names(1), row[np.newaxis])
+        BallStates(stamp, ball_names([throw]), row[np.newaxis])
         for stamp, row in zip(run.stamps_ns.tolist(), falls, strict=True)
     ]
     thrown = replace(run, throws=((throw,), *[()] * (len(run.times) - 2)), balls=tuple(states))

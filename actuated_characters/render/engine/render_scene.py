@@ -1,6 +1,7 @@
 """The shapes that are seen, each of them shown or not, and their drawings."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from actuated_characters.render.engine.shape_meshes import (
 from actuated_characters.render.engine.skin_surfaces import SkinSurfaces
 from actuated_characters.render.engine.surfaces import arrow_surface
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Quadruple, Shape, ShapeType, UrdfOptions
+from msgs_config.character.model import Pose, Quadruple, Shape, UrdfOptions
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.geometry import fixed_order, rotations
 
@@ -86,7 +87,7 @@ class RenderScene:
         self._links = _Skins.of([shape for shapes in links for shape in shapes])
         self._rows = np.repeat(np.arange(len(links)), [len(shapes) for shapes in links])
         self._terrain = _Skins.of([] if terrain is None else terrain_shapes(terrain))
-        self._ball = textured_surface_of(Shape(ShapeType.SPHERE, (1.0,)))
+        self._thrown: dict[Shape, TexturedSurface] = {}  # by shape, without a pose
         self._shown: list[_Body] = []
 
     def clear(self) -> None:
@@ -113,11 +114,14 @@ class RenderScene:
         for skin, origin, axes in zip(skins.surfaces, skins.origins, skins.axes, strict=True):
             self._shown.append(_Body(skin, _TERRAIN_COLOR, origin, axes, _SEEN))
 
-    def show_balls(self, balls: FloatArray) -> None:
-        """Show balls, of which centres and radii (m, 4) are given in m."""
+    def show_balls(self, balls: Sequence[Shape]) -> None:
+        """Show what was thrown, with poses in the world."""
         for ball in balls:
-            axes = ball[3] * np.eye(3)
-            self._shown.append(_Body(self._ball, _BALL_COLOR, ball[:3], axes, _CASTS_SHADOW))
+            shape, origin = replace(ball, pose=Pose()), np.array(ball.pose.position)
+            if shape not in self._thrown:
+                self._thrown[shape] = textured_surface_of(shape)
+            axes = rotations.matrix(np.array(ball.pose.orientation_xyzw))
+            self._shown.append(_Body(self._thrown[shape], _BALL_COLOR, origin, axes, _CASTS_SHADOW))
 
     def show_arrows(self, arrows: Iterable[FloatArray], radius: float) -> None:
         """Show arrows, none of length zero: tail and tip (2, 3); their shafts' radius; m."""

@@ -12,6 +12,7 @@ from actuated_characters.render.engine.camera_pose import (
     Spheres,
 )
 from actuated_characters.render.engine.compositor import Compositor, Picture
+from actuated_characters.render.engine.outlines import outline
 from actuated_characters.render.engine.posed_characters import Frames, LinkForce, PosedCharacters
 from actuated_characters.render.engine.render_scene import RenderScene
 from actuated_characters.render.engine.skin_surfaces import SkinSurfaces
@@ -19,13 +20,12 @@ from actuated_characters.render.engine.surfaces import HEAD_WIDTH
 from actuated_characters.render.skin.choosing import colors_of, skin_of
 from actuated_characters.render.skin.given import GivenSkin
 from msgs_config.arrays import BoolArray, FloatArray
-from msgs_config.character.model import Character, UrdfOptions, Vector
+from msgs_config.character.model import Character, Shape, UrdfOptions, Vector
 from msgs_config.geometry import fixed_order
 
 __all__ = ["FrameSpec", "Picture", "Renderer"]
 
 _DEFAULT_VIEW = CameraPose()
-_NO_BALLS = np.zeros((0, 4))
 
 _MOST_DRAWN = 2**23  # samples of a picture; each takes some 40 bytes, and more while it is drawn
 _GHOST_COLOR, _GHOST_OPACITY = (0.25, 0.85, 0.45, 1.0), 0.45
@@ -45,7 +45,7 @@ class FrameSpec:
     forces: Sequence[LinkForce] = ()
     arrow_length: float = 1.0  # m, length of an arrow whose `LinkForce.arrow` has length one
     touching: BoolArray | None = None  # (l,): the links that are marked by a colour
-    balls: FloatArray | None = None  # (m, 4): centres and radii, m in the world
+    balls: Sequence[Shape] = ()  # what was thrown, with poses in the world
     caption: str = ""  # text that `draw` adds
 
 
@@ -156,16 +156,20 @@ class Renderer:
         self._scene.show_links(frames, [_MARK_COLOR if touches else None for touches in touching])
         self._scene.show_terrain()
         bodies = self._spheres(frames)
-        balls = _NO_BALLS if frame.balls is None else frame.balls
-        self._scene.show_balls(balls)
+        self._scene.show_balls(frame.balls)
         if self._has_ground:
-            near = balls[fixed_order.norm(balls[:, :3] - view.target) < view.distance]
+            near = [ball for ball in frame.balls if _is_near(ball, view)]
             layers.darken_ground(self._scene, _with_balls(bodies, near))
         width, height = size
         everywhere = PixelRegion(0, height, 0, width)
-        box = everywhere if self._has_terrain else view.box(_with_balls(bodies, balls), size)
+        box = everywhere if self._has_terrain else view.box(_with_balls(bodies, frame.balls), size)
         layers.draw_solid(self._scene, box)
 
 
-def _with_balls(bodies: Spheres, balls: FloatArray) -> Spheres:
-    return Spheres.joined([bodies, Spheres(balls[:, :3], balls[:, 3])])
+def _is_near(ball: Shape, view: CameraPose) -> bool:
+    away = np.array(ball.pose.position) - view.target
+    return bool(fixed_order.norm(away) < view.distance)
+
+
+def _with_balls(bodies: Spheres, balls: Sequence[Shape]) -> Spheres:
+    return Spheres.joined([bodies, *map(outline, balls)])

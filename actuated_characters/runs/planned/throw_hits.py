@@ -1,4 +1,4 @@
-"""Whether balls that were thrown have hit the character, and when: from their recorded motion."""
+"""Whether what was thrown has hit the character, and when: from its recorded motion."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -63,7 +63,7 @@ def find_hit(
     step = 1.0 / settings.rate_hz
     still = WorldSettings(engine=settings.world.engine, ground=False)
     with make_world(settings.world) as alone, make_world(still) as world:
-        both = BallAndCharacter(world, plan.character, in_order[ball].throw.radius)
+        both = BallAndCharacter(world, plan.character, in_order[ball].throw)
         for number, (position, motion) in enumerate(states, start=1):
             for planned in in_order[len(alone.balls.throws) : len(motion)]:
                 alone.balls.add(planned.throw)
@@ -76,7 +76,7 @@ def find_hit(
                 break
             if np.linalg.norm(motion[ball, 7:10] - expected[ball, 7:10]) > _LEAST_CHANGE:
                 both.put_character(position)
-                gaps = both.put_ball(centre)
+                gaps = both.put_ball(centre, motion[ball, 3:7])
                 if gaps.min() < _NEAR_DISTANCE + 0.5 * speed * step:
                     return number * step, plan.character.links[int(gaps.argmin())].name
     return None

@@ -9,7 +9,8 @@ from actuated_characters.runs.plan import SHARED, RunPlan, count_ticks, make_pla
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.pins import PlannedPin
 from actuated_characters.runs.planned.strengths import PlannedStrengths
-from actuated_characters.runs.planned.throws import PlannedThrow, parse_throw, plan_throw
+from actuated_characters.runs.planned.throw_requests import parse_throw
+from actuated_characters.runs.planned.throws import PlannedThrow, plan_throw
 from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push
 from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
 from controller_node.references.timeline.description import (
@@ -121,7 +122,7 @@ def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
     pushes = [push for entry in timeline.pushes for push in _pushes(plan, entry)]
     throws: list[PlannedThrow] = []
     for entry in timeline.throws:
-        text = " ".join(f"{key}={value}" for key, value in entry.request.items())
+        text = " ".join(f"{key}={_written(value)}" for key, value in entry.request.items())
         try:
             throw, in_the_way = plan_throw(plan, parse_throw(text))
         except ActuatedCharactersError as error:
@@ -132,6 +133,13 @@ def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
     pins = _pins(plan, timeline.pins)
     inputs = PlannedInputs(pushes, throws, strengths=strengths, pins=pins)
     return TimelineRun(plan, inputs, warnings)
+
+
+def _written(value: object) -> str:
+    """A value of a throw as `run --throw` has it."""
+    if isinstance(value, list):
+        return "x".join(map(str, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _pushes(plan: RunPlan, entry: PushEntry) -> list[PlannedPush]:

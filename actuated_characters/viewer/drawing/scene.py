@@ -21,13 +21,15 @@ from actuated_characters.viewer.drawing.framing import (
     frame_points,
 )
 from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Shape, ShapeType
 from msgs_config.geometry import rotations
 from msgs_config.messages.projectiles import BallStates
 from msgs_config.messages.throw import ProjectileThrow
 
 WORLD = "/world"
 
-_BALL, _UNKNOWN_RADIUS = (225, 95, 40), 0.1  # colour; m
+_BALL = (225, 95, 40)
+_UNKNOWN = Shape(ShapeType.SPHERE, (0.1,))  # of what was thrown before it was seen
 _CATCH_UP = 4.0  # 1/s: how soon the world follows the characters
 _JUMP = 3.0  # m: a distance that is not caught up with but jumped
 BACKGROUND, LIGHT_TILE, DARK_TILE = (
@@ -150,34 +152,38 @@ def _chequerboard() -> NDArray[np.uint8]:
 
 
 class DrawnBalls:
-    """The balls of one simulator."""
+    """The balls and boxes of one simulator."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._scene, self._name = scene, name
-        self._balls: dict[str, viser.IcosphereHandle] = {}
-        self._released: deque[float] = deque(maxlen=100)  # radii, m, of balls not yet seen
+        self._balls: dict[str, viser.IcosphereHandle | viser.BoxHandle] = {}
+        self._released: deque[Shape] = deque(maxlen=100)  # of those not yet seen
 
     def draw(self, released: Sequence[ProjectileThrow], balls: BallStates | None) -> None:
         """Move the balls to where they are now."""
-        self._released += [throw.radius for throw in released]
+        self._released += [throw.shape for throw in released]
         if balls is not None:
-            self.place(balls, lambda _: self._next_radius())
+            self.place(balls, lambda _: self._next_shape())
 
-    def _next_radius(self) -> float:
-        return self._released.popleft() if self._released else _UNKNOWN_RADIUS
+    def _next_shape(self) -> Shape:
+        return self._released.popleft() if self._released else _UNKNOWN
 
-    def place(self, balls: BallStates, radius_of: Callable[[str], float]) -> None:
-        """Move the balls to where they are; new ones have the radius of their name, m."""
+    def place(self, balls: BallStates, shape_of: Callable[[str], Shape]) -> None:
+        """Move the balls to where they are; new ones have the shape of their name."""
         for name in set(self._balls) - set(balls.names):
             self._balls.pop(name).remove()
         for name, motion in zip(balls.names, balls.motion, strict=True):
             if name not in self._balls:
-                self._balls[name] = self._scene.add_icosphere(
-                    f"{self._name}/{name}", radius_of(name), color=_BALL
-                )
+                self._balls[name] = self._add(f"{self._name}/{name}", shape_of(name))
             ball = self._balls[name]
             ball.position = motion[:3]
             ball.wxyz = rotations.wxyz_from_xyzw(motion[3:7])
+
+    def _add(self, name: str, shape: Shape) -> viser.IcosphereHandle | viser.BoxHandle:
+        if shape.type is ShapeType.BOX:
+            x, y, z = shape.size
+            return self._scene.add_box(name, dimensions=(x, y, z), color=_BALL)
+        return self._scene.add_icosphere(name, shape.size[0], color=_BALL)
 
     def remove(self) -> None:
         """Remove all: a new episode has none."""

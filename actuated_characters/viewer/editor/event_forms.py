@@ -8,7 +8,11 @@ from msgs_config import files
 from msgs_config.errors import MotionError
 
 NUMBER, TEXT, VECTOR, NAMES, LINK, PLACE = "number", "text", "vector", "names", "link", "place"
-"""Kinds of fields; a vector is three numbers, as is a place, or `here`; names are one or more."""
+BOX = "box"
+"""Kinds of fields; a vector is three numbers, as is a place, or `here`; names are one or more.
+
+A box is three numbers, its edges, or nothing, for what is no box.
+"""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,7 @@ FORMS: dict[str, tuple[Field, ...]] = {
         Field("speed", NUMBER, 6.0, "m/s"),
         Field("target", LINK, "chest", "the link that it flies to"),
         Field("from", TEXT, "left", "the side that it comes from"),
+        Field("size", BOX, "", "m, of a box that slides: length, width, height; none: a ball"),
     ),
 }
 _NUMBERS = 3  # of a vector
@@ -78,6 +83,11 @@ def read_form(track: str, at: float, given: Mapping[str, Any]) -> dict[str, Any]
         value = given[field.name]
         if field.kind == PLACE and str(value).strip() == _HERE:
             value = _HERE
+        elif field.kind == BOX:
+            if not str(value).strip():
+                continue
+            value = _read_vector(field.name, str(value))
+            event |= {"shape": "box", "slide": True}
         elif field.kind in (VECTOR, PLACE):
             value = _read_vector(field.name, str(value))
         elif field.kind == NAMES:

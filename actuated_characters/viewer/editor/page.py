@@ -25,6 +25,7 @@ from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.server import ViewerServer
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.character.model import Shape
 from msgs_config.messages.state import StampedState
 
 _LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
@@ -56,7 +57,7 @@ class EditorPage:
             0,
             skin,
         )
-        self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
+        self._balls, self._shapes = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[Shape]()
         self.takes = ShownTakes(session.document.file)
         self._handles = handles_of(character)
         self._spheres = [self._add_handle(handle) for handle in self._handles]
@@ -173,12 +174,12 @@ class EditorPage:
 
     def _draw_balls(self) -> None:
         """Draw the balls of the take that is seen."""
-        run, radii = self.takes.run, list[float]()
+        run, shapes = self.takes.run, list[Shape]()
         balls = None
         if run is not None:
-            balls, radii = run.balls(row_at(run.times, self._session.time))
-        if radii != self._radii:
+            balls, shapes = run.balls(row_at(run.times, self._session.time))
+        if shapes != self._shapes:
             self._balls.remove()
-            self._radii = radii
+            self._shapes = shapes
         if balls is not None:
-            self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)
+            self._balls.place(balls, dict(zip(balls.names, shapes, strict=True)).__getitem__)

@@ -37,7 +37,7 @@ def find_hits(recording: Recording) -> list[Hit]:
 
     A ball has hit where its velocity changes by more than gravity does, and the contact force on a
     link near it changes along with it: a ball on the ground moves no link. Nothing is told of balls
-    whose mass and radius are not known, because they were thrown before the first state.
+    whose mass and size are not known, because they were thrown before the first state.
     """
     if not recording.contacts or not recording.balls:
         return []
@@ -62,7 +62,7 @@ class _Struck:
     tick: int
     name: str
     centre: FloatArray  # (3,) m, world, after the tick
-    radius: float  # m
+    reach: float  # m: nothing of it is farther from its centre
     impulse: FloatArray  # (3,) N s, beside gravity's
 
 
@@ -85,7 +85,7 @@ def _struck(recording: Recording, step: float) -> Iterator[_Struck]:
             name, centre = after.names[number], after.motion[number, :3]
             throw = throws.get(name)
             if throw is not None:
-                yield _Struck(tick, name, centre, throw.radius, throw.mass * change[number])
+                yield _Struck(tick, name, centre, throw.reach, throw.mass * change[number])
 
 
 def _pushed_link(
@@ -105,7 +105,7 @@ def _pushed_link(
         if row is None:
             continue
         place = origins[row] + rotations.rotate(turns_xyzw[row], point)
-        if np.linalg.norm(place - ball.centre) <= ball.radius + _NEAR:
+        if np.linalg.norm(place - ball.centre) <= ball.reach + _NEAR:
             old = before[link][0] if link in before else np.zeros(3)
             shares[link] = float(np.dot(old - acting, force)) / size**2
     found = max(shares, key=lambda name: shares[name], default=None)

@@ -32,6 +32,7 @@ from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import Playback, frame_times
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.server import ViewerServer
+from msgs_config.character.model import Shape
 from msgs_config.errors import ActuatedCharactersError
 
 _LEAST_REST = 0.003  # s of rest after a picture, for the threads that send it
@@ -63,7 +64,7 @@ class RecordedPlayer:
             self._scene, self._timeline, self._actions, run.push_duration, self._show_push
         )
         self._drawn = self._add_characters(skin)
-        self._balls, self._radii = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[float]()
+        self._balls, self._shapes = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[Shape]()
         self._panel = self._add_panel()
         self._bar = TimeBar(server, self._timeline, self._panel.time)
         self._marks = find_marks(run)
@@ -141,12 +142,12 @@ class RecordedPlayer:
                     sample.reference = None
                 drawn.shows = self._panel.shows
                 drawn.draw(sample)
-            balls, radii = self._run.balls(row)
-            if balls is None or radii[: len(self._radii)] != self._radii[: len(radii)]:
+            balls, shapes = self._run.balls(row)
+            if balls is None or shapes[: len(self._shapes)] != self._shapes[: len(shapes)]:
                 self._balls.remove()
             if balls is not None:
-                self._balls.place(balls, dict(zip(balls.names, radii, strict=True)).__getitem__)
-            self._radii = radii
+                self._balls.place(balls, dict(zip(balls.names, shapes, strict=True)).__getitem__)
+            self._shapes = shapes
             self._scene.follow_characters(self._drawn, seconds)
             self._bar.show_time()
         self._panel.show_time(self._run.name)

@@ -11,6 +11,7 @@ from actuated_characters.render.scene import RecordedScene, make_scene
 from actuated_characters.viewer.drawing.sample import CharacterSample
 from actuated_characters.viewer.recorded.timeline import row_at
 from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Shape
 from msgs_config.errors import RecordingError
 from msgs_config.messages.projectiles import BallStates
 from msgs_config.messages.state import StampedState
@@ -83,12 +84,11 @@ class RecordedRun:
         position: FloatArray = self.recordings[character].position[row]
         return position
 
-    def balls(self, row: int) -> tuple[BallStates | None, list[float]]:
-        """The balls that are there in a state, and their radii, m."""
+    def balls(self, row: int) -> tuple[BallStates | None, list[Shape]]:
+        """The balls and boxes that are there in a state, and their shapes."""
         recording = self.recordings[0]
         states = recording.balls[row] if recording.balls else None
-        count = 0 if states is None else len(states.names)
-        return states, self.scene.ball_radii(row, count)
+        return states, self.scene.ball_shapes(row, () if states is None else states.names)
 
 
 def read_run(path: Path, source: RobotSource | None = None) -> RecordedRun:

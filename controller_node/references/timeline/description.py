@@ -103,7 +103,7 @@ class PinEntry(Entry):
 
 @dataclass(frozen=True)
 class ThrowEntry(Entry):
-    """A ball that hits a link at the time, as `run --throw` has it."""
+    """A ball or a box that hits a link at the time, as `run --throw` has it."""
 
     request: Mapping[str, object]
 

@@ -100,7 +100,10 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
 
 _CLIP_KEYS = ("at", "clip", "from", "to", "blend", "place", "heading")
 _STEERING_KEYS = ("at", "until", "velocity", "blend")
-_THROW_KEYS = ("at", "mass", "speed", "target", "from", "distance", "radius")
+_THROW_KEYS = (
+    *("at", "mass", "speed", "target", "from", "distance"),
+    *("radius", "shape", "size", "slide"),
+)
 
 
 def _track(

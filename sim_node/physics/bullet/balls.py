@@ -1,12 +1,15 @@
-"""Balls in the engine: solid spheres that are thrown into the world."""
+"""Balls in the engine: solid spheres and boxes that are thrown into the world."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Shape, ShapeType
+from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.bullet.client import Engine, pybullet
+from sim_node.physics.bullet.ground import touch_as_box
 
 _AWAY_DISTANCE = 10_000.0  # m along x: where a ball lies that was taken out of the way
 
@@ -18,7 +21,7 @@ class BulletBalls:
         self._client = client
         self._friction = friction
         self.numbers: list[int] = []  # the engine's number of each ball
-        self._shapes: dict[float, int] = {}  # the engine's number of each shape, by radius
+        self._shapes: dict[Shape, int] = {}  # the engine's number of each shape
         self.throws: tuple[ProjectileThrow, ...] = ()
 
     def add(self, throw: ProjectileThrow) -> None:
@@ -26,8 +29,15 @@ class BulletBalls:
         client = self._client
         with client.alone():
             number = pybullet.createMultiBody(
-                throw.mass, self._shape(throw.radius), -1, throw.position, physicsClientId=client
+                throw.mass,
+                self._shape(throw.shape),
+                -1,
+                throw.position,
+                throw.turn_xyzw,
+                physicsClientId=client,
             )
+            if throw.size is not None:
+                touch_as_box(client, number)
         # One call a setting: a body silently loses some of those that share a call.
         settings = (
             {"linearDamping": 0.0, "angularDamping": 0.0},
@@ -50,7 +60,7 @@ class BulletBalls:
         """
         common = 0
         for old, new in zip(self.throws, throws, strict=False):
-            if (old.mass, old.radius) != (new.mass, new.radius):
+            if (old.mass, old.shape) != (new.mass, new.shape):
                 break
             common += 1
         for number in reversed(self.numbers[common:]):
@@ -65,16 +75,21 @@ class BulletBalls:
 
         It stays a body of the engine, which goes by their order.
         """
-        self.place(ball, (_AWAY_DISTANCE, 20.0 * ball, self.throws[ball].radius))
+        self.place(ball, (_AWAY_DISTANCE, 20.0 * ball, self.throws[ball].half_edges[2]))
         pybullet.resetBaseVelocity(
             self.numbers[ball], (0.0,) * 3, (0.0,) * 3, physicsClientId=self._client
         )
 
-    def place(self, ball: int, centre: FloatArray | Sequence[float]) -> None:
-        """Put the centre of a ball, by its place in the order, to a point (3,), m."""
+    def place(
+        self,
+        ball: int,
+        centre: FloatArray | Sequence[float],
+        turn_xyzw: FloatArray | Sequence[float] = IDENTITY_XYZW,
+    ) -> None:
+        """Put the centre of a ball, by its place in the order, to a point (3,), m, turned (4,)."""
         with self._client.alone():
             pybullet.resetBasePositionAndOrientation(
-                self.numbers[ball], centre, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+                self.numbers[ball], centre, turn_xyzw, physicsClientId=self._client
             )
 
     def set_motion(self, motion: FloatArray) -> None:
@@ -96,9 +111,14 @@ class BulletBalls:
             rows.append((*centre, *turn, *linear, *angular))
         return np.array(rows, dtype=float).reshape(-1, 13)
 
-    def _shape(self, radius: float) -> int:
-        if radius not in self._shapes:
-            self._shapes[radius] = pybullet.createCollisionShape(
-                pybullet.GEOM_SPHERE, radius=radius, physicsClientId=self._client
+    def _shape(self, shape: Shape) -> int:
+        if shape not in self._shapes:
+            is_box = shape.type is ShapeType.BOX
+            self._shapes[shape] = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX if is_box else pybullet.GEOM_SPHERE,
+                **{"halfExtents": [0.5 * edge for edge in shape.size]}
+                if is_box
+                else {"radius": shape.size[0]},
+                physicsClientId=self._client,
             )
-        return self._shapes[radius]
+        return self._shapes[shape]

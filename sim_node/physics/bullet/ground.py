@@ -48,7 +48,12 @@ def choose_ground(client: Engine, body: int, numbers: Sequence[int], character: 
     for number, link in zip(numbers, character.links, strict=True):
         is_fixed = number == _BASE and character.loading.fixed_base
         if not is_fixed and any(shape.type is ShapeType.BOX for shape in link.collision_shapes):
-            _set_group(client, body, number, _FLAT, _ALL)
+            touch_as_box(client, body, number)
+
+
+def touch_as_box(client: Engine, body: int, link: int = _BASE) -> None:
+    """Have a link of a body touch the ground's box in place of the plane; see `choose_ground`."""
+    _set_group(client, body, link, _FLAT, _ALL)
 
 
 def _set_group(client: Engine, body: int, link: int, group: int, mask: int) -> None:

@@ -1,4 +1,4 @@
-"""Balls in MuJoCo's world: solid spheres that are thrown into it."""
+"""Balls in MuJoCo's world: solid spheres and boxes that are thrown into it."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -27,7 +27,7 @@ class Ball(Part):
 
     def let_go(self, data: mujoco.MjData) -> None:
         """Put it where it is thrown, with the velocity of the throw."""
-        self.move(data, self.throw.position, rotations.IDENTITY_XYZW)
+        self.move(data, self.throw.position, self.throw.turn_xyzw)
         data.qvel[self.place.velocities] = (*self.throw.velocity, 0.0, 0.0, 0.0)
 
     def move(
@@ -73,13 +73,18 @@ class MujocoBalls:
 
         It stays a body of the engine, as it does with Bullet.
         """
-        self.place(ball, (_AWAY_DISTANCE, 20.0 * ball, self.balls[ball].throw.radius))
+        self.place(ball, (_AWAY_DISTANCE, 20.0 * ball, self.balls[ball].throw.half_edges[2]))
         self._world.data.qvel[self.balls[ball].place.velocities] = 0.0
 
-    def place(self, ball: int, centre: FloatArray | Sequence[float]) -> None:
-        """Put the centre of a ball, by its place in the order, to a point (3,), m."""
+    def place(
+        self,
+        ball: int,
+        centre: FloatArray | Sequence[float],
+        turn_xyzw: FloatArray | Sequence[float] = rotations.IDENTITY_XYZW,
+    ) -> None:
+        """Put the centre of a ball, by its place in the order, to a point (3,), m, turned (4,)."""
         data = self._world.data
-        self.balls[ball].move(data, centre, rotations.IDENTITY_XYZW)
+        self.balls[ball].move(data, centre, turn_xyzw)
         self._world.forget_frames()
 
     def set_motion(self, motion: FloatArray) -> None:

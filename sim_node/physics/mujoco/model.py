@@ -8,7 +8,7 @@ from dataclasses import replace
 import mujoco
 
 from msgs_config.character.layout import JointType
-from msgs_config.character.model import Character, Joint, Link, Pose, Shape, ShapeType
+from msgs_config.character.model import Character, Joint, Link, Pose
 from msgs_config.character.mujoco_model import compile_for_contacts
 from msgs_config.character.mujoco_world import (
     Contacts,
@@ -38,7 +38,7 @@ def compile_world(
         CharacterError: a file cannot be used, or MuJoCo refuses what it says.
     """
     # Characters are compared by identity, and kept with the model, so that none takes another's.
-    shapes = tuple((ball.mass, ball.radius) for ball in balls)
+    shapes = tuple((ball.mass, ball.shape) for ball in balls)
     key = (*map(id, characters), shapes, replace(settings, gravity=0.0))
     with _keeping:
         if key not in _kept:
@@ -50,11 +50,19 @@ def compile_world(
 
 
 def ball_link(number: int, throw: ProjectileThrow) -> Link:
-    """A ball as a body of one link: a solid sphere."""
-    inertia = 0.4 * throw.mass * throw.radius * throw.radius
-    shape = Shape(ShapeType.SPHERE, (throw.radius,))
-    joint = Joint(f"ball {number}", JointType.FLOATING)
-    return Link(f"ball {number}", -1, joint, throw.mass, (inertia,) * 3, Pose(), (), (shape,))
+    """A ball as a body of one link: a solid sphere, or a box."""
+    joint, inertia = Joint(f"ball {number}", JointType.FLOATING), _inertia(throw)
+    return Link(f"ball {number}", -1, joint, throw.mass, inertia, Pose(), (), (throw.shape,))
+
+
+def _inertia(throw: ProjectileThrow) -> tuple[float, float, float]:
+    """The moments of inertia of a solid sphere or box about its axes, kg m^2."""
+    if throw.size is None:
+        (radius,) = throw.shape.size
+        return (0.4 * throw.mass * radius * radius,) * 3
+    x, y, z = (edge * edge for edge in throw.size)
+    twelfth = throw.mass / 12.0
+    return twelfth * (y + z), twelfth * (x + z), twelfth * (x + y)
 
 
 def _compile(

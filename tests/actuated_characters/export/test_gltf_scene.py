@@ -197,7 +197,7 @@ def test_a_ball_is_there_while_it_is_thrown() -> None:
     gone = np.full(3, np.nan)
     centres = np.array([gone, (1.0, 2.0, 3.0), (1.5, 2.0, 3.5), gone])
     turns = np.where(np.isnan(centres[:, :1]), np.nan, np.array([0.0, 0.0, 0.0, 1.0]))
-    ball = BallTrajectory("ball_1", 0.25, centres, turns)
+    ball = BallTrajectory("ball_1", Shape(ShapeType.SPHERE, (0.25,)), centres, turns)
 
     gltf = written(replace(motion, balls=(ball,)), ground=True)
 

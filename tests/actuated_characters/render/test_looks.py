@@ -12,6 +12,7 @@ from actuated_characters.render.engine import rasteriser
 from actuated_characters.render.engine.camera_pose import CameraPose
 from actuated_characters.render.engine.posed_characters import LinkForce
 from actuated_characters.render.engine.renderer import FrameSpec, Picture, Renderer
+from msgs_config.character.model import Pose, Shape, ShapeType
 from tests.support.physics import character
 
 DATA = Path(__file__).parents[2] / "data" / "tinyrenderer"
@@ -38,7 +39,7 @@ def take(name: str) -> Picture:
         ghost=ghost,
         forces=[LinkForce(1, np.zeros(3), np.array((0.6, 0.5, -0.2)))],
         touching=touching,
-        balls=np.array([(-0.7, -0.4, 1.1, 0.2)]),
+        balls=[Shape(ShapeType.SPHERE, (0.2,), Pose((-0.7, -0.4, 1.1)))],
     )
     return Renderer(whole).picture(frame, SIZE)
 

@@ -10,6 +10,10 @@ from actuated_characters.render.engine.renderer import Renderer
 from actuated_characters.render.scene import make_scene
 from actuated_characters.report.events import mode_events, throw_events
 from lecture.framework.study import RunSpec
+from msgs_config.arrays import FloatArray
+from msgs_config.character.model import Pose, Shape, ShapeType
+from msgs_config.geometry import rotations
+from msgs_config.geometry.rotations import IDENTITY_XYZW
 from msgs_config.messages.projectiles import BallStates, ball_names, decode_balls, encode_balls
 from msgs_config.messages.throw import ProjectileThrow
 from tests.support.in_process import InProcessRunner
@@ -23,9 +27,18 @@ ONE = ProjectileThrow(2.0, 0.1, (1.0, 0.0, 1.0), (-3.0, 0.0, 4.0))
 OTHER = ProjectileThrow(3.0, 0.2, (0.0, 2.0, 1.0), (0.0, -1.0, 0.0))
 
 
+BOX = ProjectileThrow(3.0, None, (0.0, 2.0, 1.0), (0.0, -1.0, 0.0), (0.6, 0.1, 0.2), 0.5)
+
+
+def sphere_at(centre: FloatArray, radius: float) -> Shape:
+    """A ball with its centre (3,) in the world, m."""
+    return Shape(ShapeType.SPHERE, (radius,), Pose.of_arrays(centre, np.array(IDENTITY_XYZW)))
+
+
 def balls_at(stamp_ns: int, *centres: tuple[float, float, float]) -> BallStates:
     rows = [(*centre, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6) for centre in centres]
-    return BallStates(stamp_ns, ball_names(len(rows)), np.array(rows))
+    names = tuple(f"ball_{number + 1}" for number in range(len(rows)))
+    return BallStates(stamp_ns, names, np.array(rows))
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +67,11 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 def test_where_the_balls_are_is_read_as_it_was_written() -> None:
     rng = np.random.default_rng(1)
-    balls = BallStates(12_500_000, ball_names(3), rng.normal(size=(3, 13)))
+    balls = BallStates(12_500_000, ball_names([ONE, BOX, OTHER]), rng.normal(size=(3, 13)))
 
     found = decode_balls(encode_balls(balls))
 
-    assert (found.stamp_ns, found.names) == (12_500_000, ("ball_1", "ball_2", "ball_3"))
+    assert (found.stamp_ns, found.names) == (12_500_000, ("ball_1", "box_2", "ball_3"))
     assert found.motion.tobytes() == balls.motion.tobytes()
 
 
@@ -66,7 +79,7 @@ def test_a_scene_has_the_balls_of_each_state_with_their_radii(recording: Recordi
     scene = make_scene([recording])
 
     frames = scene.frames(np.arange(6), [""] * 6, ghosts=False)
-    found = [[] if frame.balls is None else frame.balls.tolist() for frame in frames]
+    found = [[[*ball.pose.position, *ball.size] for ball in frame.balls] for frame in frames]
 
     assert found == [
         [],
@@ -83,24 +96,25 @@ def test_where_a_bag_begins_with_balls_the_throws_in_it_are_those_of_later_ones(
 ) -> None:
     part = replace(recording.rows(slice(4, 6)), throws=((OTHER,),))
 
-    radii = make_scene([part]).ball_radii(1, 2)
+    shapes = make_scene([part]).ball_shapes(1, ("ball_1", "ball_2"))
 
-    assert radii == [0.1, 0.2]  # by default, and as it was thrown
+    assert [shape.size for shape in shapes] == [(0.1,), (0.2,)]  # by default, and as it was thrown
     assert [event.text.split()[0] for event in throw_events(part)] == ["ball_2"]
 
 
 def test_balls_that_are_told_of_late_are_those_that_were_thrown(recording: Recording) -> None:
     late = replace(recording, balls=(*[None] * 5, recording.balls[5]))
 
-    assert make_scene([late]).ball_radii(5, 2) == [0.2, 0.1]
+    shapes = make_scene([late]).ball_shapes(5, ("ball_1", "ball_2"))
+    assert [shape.size for shape in shapes] == [(0.2,), (0.1,)]
 
 
 @pytest.mark.parametrize("ground", [False, True])
 def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
     camera = Renderer(HUMANOID, ground=ground)
     view = view_of(camera, REST, size=SIZE)
-    ball = np.array([[*view.target, 0.15]])
-    ball[0, :3] += 0.8 * view.axes()[2]  # towards the camera: before the character
+    # towards the camera: before the character
+    ball = [sphere_at(view.target + 0.8 * view.axes()[2], 0.15)]
 
     empty = take_picture(camera, REST, view=view, size=SIZE)
     full = take_picture(camera, REST, view=view, size=SIZE, balls=ball)
@@ -119,12 +133,31 @@ def test_a_ball_is_seen_where_it_is_and_nowhere_else(ground: bool) -> None:
     assert np.array_equal(again, empty)
 
 
+def test_a_box_is_seen_turned_as_it_is() -> None:
+    camera = Renderer(HUMANOID, ground=False)
+    view = replace(view_of(camera, REST, size=SIZE), pitch=0.0)
+    right, _, back = view.axes()
+    turn = rotations.about_z(float(np.arctan2(right[1], right[0])))
+    pose = Pose.of_arrays(view.target + 0.8 * back, turn)  # towards the camera, and turned to it
+    box = Shape(ShapeType.BOX, (0.5, 0.01, 0.2), pose)
+
+    empty = take_picture(camera, REST, view=view, size=SIZE)
+    full = take_picture(camera, REST, view=view, size=SIZE, balls=[box])
+
+    differs = (empty != full).any(axis=2)
+    rows, columns = np.mgrid[: SIZE[1], : SIZE[0]]
+    pixel = 2.0 * np.tan(0.5 * view.field_of_view) / SIZE[1] * (view.distance - 0.8)
+    across = pixel * np.abs(columns + 0.5 - 0.5 * SIZE[0])
+    along = pixel * np.abs(rows + 0.5 - 0.5 * SIZE[1])
+    slack = 2.0 * pixel
+    assert differs[(across < 0.25 - slack) & (along < 0.1 - slack)].all()
+    assert not differs[(across > 0.25 + slack) | (along > 0.1 + slack)].any()
+
+
 def test_a_ball_behind_the_character_is_hidden() -> None:
     camera = Renderer(HUMANOID, ground=False)
     view = view_of(camera, REST, size=SIZE)
-    behind = np.array([[*view.target, 0.02]])
-    behind[0, :3] -= 1.0 * view.axes()[2]
-    behind[0, 2] += 0.1
+    behind = [sphere_at(view.target - 1.0 * view.axes()[2] + (0.0, 0.0, 0.1), 0.02)]
 
     empty = take_picture(camera, REST, view=view, size=SIZE)
     full = take_picture(camera, REST, view=view, size=SIZE, balls=behind)

@@ -23,16 +23,16 @@ from actuated_characters.runs.planned.throw_hits import (
     find_hit,
     read_states,
 )
+from actuated_characters.runs.planned.throw_requests import ThrowRequest, parse_throw
 from actuated_characters.runs.planned.throws import (
     PlannedThrow,
-    ThrowRequest,
-    parse_throw,
     plan_throw,
     plan_throws,
 )
 from actuated_characters.runs.planned.wrenches import plan_push
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, RecordingError
+from msgs_config.geometry import rotations
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow, natural_radius
 from sim_node.physics.balls.sphere_sweep import find_impact
@@ -107,13 +107,39 @@ def test_a_ball_hits_its_target_at_its_time_from_its_side(
     assert np.arccos(came @ expected) < slack
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["bullet", "mujoco"])
+@pytest.mark.parametrize("side", ["front", "left"])
+def test_a_box_slides_to_its_target_at_its_time_and_speed(side: str, engine: str) -> None:
+    plan = plan_of(1.0, engine=engine)
+    size = (0.3, 0.2, 0.1)
+    request = ThrowRequest(
+        4.0, 3.0, 0.8, "left_ankle", side, 1.5, shape="box", size=size, slide=True
+    )
+
+    planned, _ = plan_throw(plan, request)
+    states: States = []
+    watch = partial(watch_states, states)
+    ticks = list(ticks_in_process(plan, (), [planned], watch=watch))
+
+    assert len(ticks) == RATE
+    hit = find_hit(plan, [planned], 0, states)
+    assert hit is not None and hit[1] == "left_ankle"
+    assert abs(hit[0] - 0.8) <= 3.0 / RATE
+    (last,) = states[round(hit[0] * RATE) - 4][1]
+    assert np.linalg.norm(last[7:10]) == pytest.approx(3.0, rel=0.02)
+    assert last[2] == pytest.approx(0.05, abs=2e-3)
+
+
 @pytest.mark.parametrize(("radius", "distance"), [(0.005, 8.0), (0.0078, 20.0), (0.1, 300.0)])
 def test_a_small_ball_from_far_away_is_aimed_at_the_surface(radius: float, distance: float) -> None:
     position = np.array(HUMANOID.rest_position)
     ahead = np.array((1.0, 0.0, 0.0))
 
-    far = find_impact(HUMANOID, position, "chest", ahead, radius, distance)
-    near = find_impact(HUMANOID, position, "chest", ahead, radius, 1.0)
+    ball = ProjectileThrow(1.0, radius, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    far = find_impact(HUMANOID, position, "chest", ahead, ball, distance)
+    near = find_impact(HUMANOID, position, "chest", ahead, ball, 1.0)
 
     assert far.centre == pytest.approx(near.centre, abs=1e-5)
     assert far.before == near.before == ()
@@ -174,7 +200,12 @@ def test_a_throw_is_read_as_it_is_written() -> None:
     assert parse_throw(
         "at=1,speed=3,target=neck,mass=1,distance=4,radius=0.1,from=-30"
     ) == ThrowRequest(1.0, 3.0, 1.0, "neck", "-30", 4.0, 0.1)
-    assert ThrowRequest(7.0, 1.0, 1.0, "neck").size == natural_radius(7.0)
+    box = parse_throw("mass=9 speed=2 at=1 target=neck shape=box size=0.3x0.6x.2 slide=true")
+    assert (box.size, box.slide) == ((0.3, 0.6, 0.2), True)
+    assert box.body(0.4).turn_xyzw == pytest.approx(rotations.about_z(0.4))
+    cube = parse_throw("mass=4 speed=2 at=1 target=neck shape=box").body()
+    assert cube.size == pytest.approx((0.2, 0.2, 0.2))  # 500 kg/m^3
+    assert ThrowRequest(7.0, 1.0, 1.0, "neck").body().radius == natural_radius(7.0)
 
 
 GOOD = ["mass=2", "speed=8", "at=0.9", "target=chest"]
@@ -198,6 +229,20 @@ WRONG: list[tuple[str, ...]] = [  # in place of the good ones, and parts of the 
     ("hard", "'hard': write it as 'mass=2"),
     ("distance=0.1", "distance is 0.1 m", "nearer than the radius"),
     ("target=right_ankle", "in the ground", "'radius'"),
+    ("shape=bax", "'bax'", "did you mean 'box'?"),
+    ("size=1x1x1", "a ball has a 'radius'; 'size' and 'slide' are of shape=box"),
+    ("shape=box radius=0.1", "a ball has a 'radius'"),
+    ("shape=box size=1x1", "size is '1x1'; it must be three lengths in m, such as 0.3x0.5x0.2"),
+    ("shape=box size=1x1xb", "size is 'b'"),
+    ("shape=box size=0x1x1", "size_x is 0; it must be 0.01 to 10"),
+    ("shape=box slide=yes", "slide is 'yes'; it must be true or false"),
+    ("shape=box slide=true from=above target=right_ankle", "'above' cannot slide"),
+    (
+        "shape=box slide=true target=right_ankle size=0.1x0.5x0.5",
+        *("a box of 0.1 x 0.5 x 0.5 m would tip over", "0.222 m high at most"),
+    ),
+    ("shape=box slide=true", "does not touch 'chest'", "'size'"),
+    ("shape=box target=right_ankle", "in the ground", "slide=true"),
 ]
 
 
@@ -245,7 +290,7 @@ class Made:
 
 THROWN = [
     "mass=2 speed=8 at=0.5 from=front target=chest",
-    "mass=3 speed=4 at=0.6 from=back target=root distance=1",
+    "mass=3 speed=4 at=0.6 from=back target=root distance=1 shape=box size=0.2x0.3x0.1",
 ]
 
 

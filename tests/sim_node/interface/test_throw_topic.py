@@ -12,7 +12,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.messages import topics
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.projectiles import decode_balls
-from msgs_config.messages.throw import NUMBERS, ProjectileThrow, natural_radius
+from msgs_config.messages.throw import BOX_NUMBERS, NUMBERS, ProjectileThrow, natural_radius
 from sim_node.physics.balls.throws import MOST_BALLS
 from tests.sim_node.conftest import Join
 from tests.support.physics import character, joint_simulation, simulation
@@ -29,11 +29,12 @@ from tests.support.ros import (
 CLOCK = TickClock(240)
 AT_CHEST = ProjectileThrow(2.0, 0.1, (0.4, 0.02, 1.2), (-8.0, 0.0, 1.0))
 FAR = ProjectileThrow(3.0, natural_radius(3.0), (5.0, 5.0, 0.4), (1.0, 0.0, 0.0))
+BOX = ProjectileThrow(9.0, None, (1.0, 0.0, 0.1), (-3.0, 0.0, 0.0), (0.4, 0.3, 0.2), 0.3)
 
 
 def throw_message(stamp: int, throw: ProjectileThrow) -> JointState:
     """A throw, stamped in ns."""
-    return joint_state(stamp, NUMBERS, throw.numbers().tolist())
+    return joint_state(stamp, throw.names, throw.numbers().tolist())
 
 
 def numbers_message(stamp: int, other: Mapping[str, float]) -> JointState:
@@ -140,6 +141,34 @@ def test_balls_are_shown_where_they_are_until_a_reset(
     assert [(m.id, m.action) for m in again[len(body) :]] == [(ball.id, Marker.DELETE)]
 
 
+def test_a_box_is_told_and_seen_as_one(processes: Processes, client: SimulatorClient) -> None:
+    applied, thrown = hear(client)
+    shown, throws = client.listen(topics.VISUALIZATION), client.speak(topics.THROW)
+    processes.simulator("humanoid", max_ticks=40, display_rate=240, wait_for_subscribers=1)
+
+    send(client, throws, throw_message(CLOCK.stamp_ns(3), FAR))
+    send(client, throws, throw_message(CLOCK.stamp_ns(5), BOX))
+    state = client.first_state()
+    while tick_of(state) < 31:
+        state = client.advance(state, {})
+    client.spin_until(lambda: 31 in thrown.ticks(), "the last place of the box")
+    client.spin_until(lambda: markers_at(shown, 31), "the box is seen")
+
+    assert [tuple(message.name) for message in applied.messages] == [NUMBERS, BOX_NUMBERS]
+    assert list(applied.messages[1].position) == BOX.numbers().tolist()
+    assert thrown.messages[-1].joint_names == ["ball_1", "box_2"]
+    *_, sphere, cube = markers_at(shown, 31)
+    assert (sphere.type, cube.type) == (Marker.SPHERE, Marker.CUBE)
+    assert (cube.scale.x, cube.scale.y, cube.scale.z) == BOX.size
+    turn = cube.pose.orientation
+    assert [turn.x, turn.y, turn.z, turn.w] == motions(thrown)[31][1, 3:7].tolist()
+    with simulation("humanoid") as run:
+        for tick in range(1, 31):
+            thrown_now = {3: [FAR], 5: [BOX]}.get(tick, ())
+            run.step([np.zeros(run.layout.size)], None, thrown_now)
+        assert motions(thrown)[31].tobytes() == run.ball_motion().tobytes()
+
+
 def markers_at(shown: ReceivedMessages, tick: int) -> list[Marker]:
     """The markers of a tick; none if they are not there."""
     found = [m.markers for m in shown.messages if tick_of(m.markers[0]) == tick]
@@ -154,6 +183,7 @@ REFUSED: dict[str, tuple[JointState | bytes, str]] = {
     "fewer values": (joint_state(0, NUMBERS, [1.0] * 7), "8 names but 7 numbers"),
     "not a number": (numbers_message(0, {"vy": float("nan")}), "vy is nan; it must be finite"),
     "no mass": (numbers_message(0, {"mass": -1.0}), "mass is -1; it must be 0.001 to 10000"),
+    "a ball and a box": (numbers_message(0, {"size_x": 0.1}), "unknown number 'radius'"),
     "too large": (numbers_message(0, {"radius": 9.0}), "radius is 9; it must be 0.005 to 5"),
     "too fast": (numbers_message(0, {"vz": 5e3}), "at most 1000 m/s"),
     "no message": (b"\x00\x01\x00\x00\xff\xff\xff\xff", "no JointState"),

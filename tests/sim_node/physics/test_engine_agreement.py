@@ -15,6 +15,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
+from msgs_config.messages.throw import ProjectileThrow
 from sim_node.physics.balls.sphere_sweep import find_impact
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.settings import WorldSettings
@@ -141,14 +142,22 @@ def test_both_engines_weigh_the_character_alike_under_another_gravity(name: str)
     ("name", "link"), [("humanoid", "chest"), ("humanoid", "left_wrist"), ("laikago", "chassis")]
 )
 @pytest.mark.parametrize("origin", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.8, 0.0)])
-def test_the_engines_agree_where_a_ball_meets_a_link(
-    name: str, link: str, origin: tuple[float, float, float]
+@pytest.mark.parametrize(
+    "thrown",
+    [
+        ProjectileThrow(1.0, 0.1, (0.0,) * 3, (0.0,) * 3),
+        ProjectileThrow(1.0, None, (0.0,) * 3, (0.0,) * 3, (0.3, 0.1, 0.2), 0.4),
+    ],
+    ids=["ball", "box"],
+)
+def test_the_engines_agree_where_what_is_thrown_meets_a_link(
+    name: str, link: str, origin: tuple[float, float, float], thrown: ProjectileThrow
 ) -> None:
     whole = character(name)
     rest, way = np.array(whole.rest_position), np.array(origin)
 
     one, other = (
-        find_impact(whole, rest, link, way, radius=0.1, distance=2.0, engine=engine)
+        find_impact(whole, rest, link, way, thrown, distance=2.0, engine=engine)
         for engine in ("bullet", "mujoco")
     )
 

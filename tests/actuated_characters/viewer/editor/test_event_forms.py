@@ -21,11 +21,16 @@ def test_what_is_typed_becomes_numbers_and_names() -> None:
     held = {"until": 3.0, "link": "neck", "force": 90.0}
     here = read_form("pins", 2.0, {**held, "point": "here"})
     there = read_form("pins", 2.0, {**held, "point": "0.1, 0, 2"})
+    thrown = {"mass": 2.0, "speed": 3.0, "target": "chest", "from": "left"}
+    ball = read_form("throws", 2.0, {**thrown, "size": " "})
+    box = read_form("throws", 2.0, {**thrown, "size": "0.4, 0.6, 0.2"})
 
     assert here == {"at": 2.0, **held, "point": "here"}
     assert there["point"] == [0.1, 0.0, 2.0]
     assert push == {"at": 2.0, "link": "chest", "force": [0.0, 200.0, 0.0]}
     assert weak["joints"] == ["neck", "right_knee"]
+    assert ball == {"at": 2.0, **thrown}
+    assert box == {**ball, "size": [0.4, 0.6, 0.2], "shape": "box", "slide": True}
 
 
 @pytest.mark.parametrize(
