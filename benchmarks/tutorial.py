@@ -25,7 +25,6 @@ PATIENCE = 60.0  # s that a page may take
 SIMULATED = 400.0  # s that a take may take
 RIGHT_HAND = (661.0, 453.0)  # pixels of the page, as it opens
 RAISED, OUT, IN = (-75.0, -270.0), (-50.0, 0.0), (60.0, -10.0)  # pixels of the drags of the hand
-_STEP = 0.02  # s between the times of the time line; a click goes to the one before it
 FALLEN, STANDS = 0.3, 0.75  # m: heights of the pelvis, below and above
 
 # the least part of the page that has a text, and what is beside it
@@ -130,7 +129,7 @@ class Hands:
         while shown not in self.text() and time.monotonic() - begun < PATIENCE:
             left, top, width, height, last = self._browser.evaluate(_TIME_LINE)
             # above the keys, whose marks would take the click
-            self._click_at(left + width * (at + _STEP / 2.0) / last, top + height - 20.0)
+            self._click_at(left + width * at / last, top + height - 20.0)
             time.sleep(2.0)
         self.wait(shown)
 

@@ -152,15 +152,30 @@ def add_event(track: str, event: Mapping[str, Any]) -> Edit:
     return edit
 
 
+def event_at(event: Mapping[str, Any], at: float) -> dict[str, Any]:
+    """An event at another time in s; its end moves along."""
+    moved = {**event, "at": _time(at)}
+    if is_number(event.get("until")):
+        moved["until"] = rounded(event["until"] + _time(at) - event["at"])
+    return moved
+
+
+def replace_event(track: str, number: int, event: Mapping[str, Any]) -> Edit:
+    """Have another event in the place of one."""
+
+    def edit(content: Content) -> Content:
+        _item(content, track, number)
+        return _with_list(content, track, _in_order(_with(content[track], number, dict(event))))
+
+    return edit
+
+
 def move_event(track: str, number: int, at: float) -> Edit:
     """Move an event to another time in s; its end moves along."""
 
     def edit(content: Content) -> Content:
-        event = dict(_item(content, track, number))
-        if is_number(event.get("until")):
-            event["until"] = rounded(event["until"] + _time(at) - event["at"])
-        event["at"] = _time(at)
-        return _with_list(content, track, _in_order(_with(content[track], number, event)))
+        moved = event_at(_item(content, track, number), at)
+        return replace_event(track, number, moved)(content)
 
     return edit
 
@@ -169,9 +184,7 @@ def copy_event(track: str, number: int, at: float) -> Edit:
     """Add an event once more, at another time in s."""
 
     def edit(content: Content) -> Content:
-        event = _item(content, track, number)
-        last = len(content[track])
-        return move_event(track, last, at)({**content, track: [*content[track], event]})
+        return add_event(track, event_at(_item(content, track, number), at))(content)
 
     return edit
 

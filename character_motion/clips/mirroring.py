@@ -4,6 +4,8 @@ Where its joints are at zero, a character that is the same on both sides is its 
 plane x, z. A turn `R` becomes `S R S` of the image, with S the reflection.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from character_motion.clips.motion_clip import MotionClip
@@ -81,7 +83,11 @@ def _is_image(point: FloatArray, other: FloatArray) -> bool:
 
 def counterpart(character: Character, name: str) -> str:
     """The name of a joint on the other side; its own where it has no side."""
-    names = character.layout.joint_names
+    return counterpart_among(character.layout.joint_names, name)
+
+
+def counterpart_among(names: Sequence[str], name: str) -> str:
+    """The one of some names that is on the other side; the name itself where there is none."""
     for one, two in _WORDS:
         for word, other in ((one, two), (two, one)):
             if word in name and name.replace(word, other) in names:

@@ -32,7 +32,7 @@ NO_CHROMIUM = "not run: chromium is not installed (Debian: apt-get install chrom
 needs_chromium = pytest.mark.skipif(not CHROMIUM, reason=NO_CHROMIUM)
 
 SIZE = (800, 600)  # of the window, in pixels
-SHIFT = 8  # of DevTools' bits of modifiers
+CONTROL, SHIFT = 2, 8  # of DevTools' bits of modifiers
 
 Pixels = NDArray[np.uint8]
 

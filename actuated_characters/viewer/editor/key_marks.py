@@ -5,6 +5,7 @@ from typing import Any
 
 from actuated_characters.timeline.content import KEYS, TRACKS, Content, is_number
 from actuated_characters.viewer.editor.event_forms import describe_event
+from actuated_characters.viewer.editor.items import Item
 from actuated_characters.viewer.recorded.marks import END, KEYFRAME, Mark
 
 _KINDS = {"pushes": "push", "throws": "throw"}
@@ -21,23 +22,35 @@ _COLORS = {
 
 
 def find_key_marks(content: Content, length: float) -> list[Mark]:
-    """The marks by their start; the time line is so long, s."""
-    marks = [
-        Mark(KEYFRAME, float(pose["at"]), float(pose["at"]), _describe_key(number, layer, pose))
-        for number, layer in enumerate(content.get(KEYS, []))
-        for pose in layer["poses"]
-    ]
-    spans = [track for track in TRACKS if track not in _KINDS and content.get(track)]
+    """The marks by their start, each with its item; the time line is so long, s."""
+    marks = [Mark(END, length, length, "the end")]
+    for layer, each in enumerate(content.get(KEYS, [])):
+        for number, pose in enumerate(each["poses"]):
+            at, item = float(pose["at"]), str(Item(KEYS, number, layer))
+            text = _describe_key(layer, each, pose)
+            marks.append(Mark(KEYFRAME, at, at, text, lane=layer, item=item))
+    lanes: list[tuple[str, float]] = []  # the track of each row, and when its last event ends, s
     for track in TRACKS:
         for number, event in enumerate(content.get(track, [])):
             start, text = float(event["at"]), describe_event(track, number, event)
+            item = str(Item(track, number))
             if track in _KINDS:
-                marks.append(Mark(_KINDS[track], start, start, text))
+                marks.append(Mark(_KINDS[track], start, start, text, item=item))
                 continue
-            lane, end = spans.index(track), _end_of(event)
-            marks.append(Mark(_SPAN, start, end, text, track, _COLORS[track], lane))
-    marks.append(Mark(END, length, length, "the end"))
+            end = _end_of(event)
+            lane = _free_lane(lanes, track, start)
+            lanes[lane] = (track, end)
+            marks.append(Mark(_SPAN, start, end, text, track, _COLORS[track], lane, item))
     return sorted(marks, key=lambda mark: mark.start)
+
+
+def _free_lane(lanes: list[tuple[str, float]], track: str, start: float) -> int:
+    """A row of the track in which nothing is at a time in s; a new one if there is none."""
+    for lane, (name, end) in enumerate(lanes):
+        if name == track and end <= start:
+            return lane
+    lanes.append((track, start))
+    return len(lanes) - 1
 
 
 def _describe_key(number: int, layer: Mapping[str, Any], pose: Mapping[str, Any]) -> str:

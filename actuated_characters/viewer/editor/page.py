@@ -18,13 +18,13 @@ from actuated_characters.viewer.editor.handles import Drag, Handle, handles_of, 
 from actuated_characters.viewer.editor.key_marks import find_key_marks
 from actuated_characters.viewer.editor.panel import EditorPanel
 from actuated_characters.viewer.editor.session import Session
-from actuated_characters.viewer.editor.shown_takes import NO_TAKE, ShownTakes
+from actuated_characters.viewer.editor.shown_takes import ShownTakes
+from actuated_characters.viewer.editor.time_edits import TimeEdits
 from actuated_characters.viewer.recorded.time_bar import TimeBar
 from actuated_characters.viewer.recorded.timeline import row_at
 from actuated_characters.viewer.web.rejections import Rejections
 from actuated_characters.viewer.web.server import ViewerServer
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Shape
 from msgs_config.messages.state import StampedState
 
@@ -59,11 +59,16 @@ class EditorPage:
         )
         self._balls, self._shapes = DrawnBalls(self._scene.api, f"{WORLD}/balls"), list[Shape]()
         self.takes = ShownTakes(session.document.file)
+        session.seen = self.takes.position
         self._handles = handles_of(character)
         self._spheres = [self._add_handle(handle) for handle in self._handles]
         self._panel = EditorPanel(server.gui, session, self.takes, self._actions)
         self._bar = TimeBar(server, session.playback, self._panel.time)
-        self._marked = -1  # the version of the session whose marks are shown
+        self._edits = TimeEdits(
+            server.gui, self._bar, session, self._panel.chosen, self._panel.act, self._actions
+        )
+        self._marked: tuple[object, ...] | None = None  # what the marks are of that are shown
+        self._edited = (session.version, session.poses_by_hand)
         self._drag: Drag | None = None
         self._pointer: FloatArray = np.zeros(3)  # where it began, m, the browser's
         self._client: int | None = None  # whose drag it is
@@ -104,8 +109,8 @@ class EditorPage:
     def _dragged(self, handle: Handle, event: "viser.SceneNodeDragEvent[Any]") -> None:
         session = self._session
         if event.phase == "start":
-            pose = self._seen_pose()
-            self.takes.choose(NO_TAKE)
+            pose = session.pose
+            self.takes.leave()
             session.take_pose(pose)
             stands = standing_links(session.character, pose) if self._panel.feet_stay else ()
             self._drag = Drag(
@@ -124,14 +129,6 @@ class EditorPage:
         if event.phase == "end":
             self._drag = self._client = None
 
-    def _seen_pose(self) -> GeneralizedPosition:
-        """The pose that is seen: of the take, or of the session."""
-        session = self._session
-        position = self.takes.position(session.time)
-        return (
-            session.pose if position is None else session.character.layout.configuration(position)
-        )
-
     def play(self, fps: float, rejections: Rejections) -> None:
         """Show it until an interruption, and print what is rejected."""
         before = time.monotonic()
@@ -146,10 +143,18 @@ class EditorPage:
     def step(self, seconds: float) -> None:
         """Do what clients have done, go on by a wall time in s if it plays, and draw."""
         self._actions.run()
+        self._see_edits()
         self._session.playback.advance(seconds)
         self.draw()
         if self._drag is None:  # the world must not move while something is dragged
             self._scene.follow_characters([self._drawn], seconds)
+
+    def _see_edits(self) -> None:
+        """Have what was edited seen, and no take."""
+        edited = (self._session.version, self._session.poses_by_hand)
+        if self._edited != edited:
+            self._edited = edited
+            self.takes.leave()
 
     def draw(self) -> None:
         """Bring all pages to the session."""
@@ -168,9 +173,19 @@ class EditorPage:
                 sphere.visible = self.takes.run is None
             self._bar.show_time()
         self._panel.show()
-        if self._marked != session.version:
-            self._marked = session.version
-            self._bar.mark(find_key_marks(session.document.content, session.playback.end))
+        self._mark()
+
+    def _mark(self) -> None:
+        """Bring the marks of the time line to the session, also where an edit was refused."""
+        session = self._session
+        event, end = self._panel.chosen.event, session.playback.end
+        marked = (session.version, session.layer, event, end, self._edits.count)
+        if self._marked != marked:
+            self._marked = marked
+            self._bar.tell(
+                document=session.version, layer=session.layer, chosen=str(event) if event else ""
+            )
+            self._bar.mark(find_key_marks(session.document.content, end))
 
     def _draw_balls(self) -> None:
         """Draw the balls of the take that is seen."""

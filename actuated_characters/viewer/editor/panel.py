@@ -10,8 +10,10 @@ from actuated_characters.timeline import edits
 from actuated_characters.timeline.content import KEYS, TRACKS
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.controls.markup import as_text
+from actuated_characters.viewer.editor.chosen import Chosen
 from actuated_characters.viewer.editor.event_forms import describe_event
 from actuated_characters.viewer.editor.event_panel import EventForm
+from actuated_characters.viewer.editor.items import Item
 from actuated_characters.viewer.editor.joint_panel import JointFields
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.editor.shown_takes import ShownTakes
@@ -35,8 +37,9 @@ class EditorPanel:
         self, gui: viser.GuiApi, session: Session, takes: ShownTakes, actions: ActionQueue
     ) -> None:
         self._gui, self._session, self._actions = gui, session, actions
-        self._takes = takes
-        self._shown_version, self._numbers = -1, list[tuple[str, int]]()
+        self._takes, self.chosen = takes, Chosen(session)
+        self._shown: tuple[int, int] | None = None  # the version and the layer that are shown
+        self._items = list[Item]()
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("actuated characters")
         self._state = gui.add_markdown("")
@@ -84,11 +87,10 @@ class EditorPanel:
         on(self._actions, group, lambda name: self.act(functions[name]), click=True)
 
     def _add_edits(self) -> None:
-        session = self._session
-        self._buttons(
-            "Pose",
-            {"Key": session.set_key, "Mirror": session.mirror, "Delete": session.delete_key},
-        )
+        session, chosen = self._session, self.chosen
+        pose = {"Key": session.set_key, "Mirror": chosen.mirror, "Delete": chosen.delete}
+        self._buttons("Pose", pose)
+        self._buttons("Copies", {"Copy": chosen.copy, "Paste": chosen.paste})
         undo = {"Undo": session.undo, "Redo": session.redo, "Read again": session.read_again}
         self._buttons("File", undo)
 
@@ -101,13 +103,16 @@ class EditorPanel:
                 self._writes,
                 lambda label: setattr(session, "writes_all", label == _ALL),
             )
-            self._buttons("Copies", {"Copy": session.copy, "Paste": session.paste})
-            go = {"Previous": partial(session.go_to_key, -1), "Next": partial(session.go_to_key, 1)}
+            go = {"Previous": partial(self._go_to_key, -1), "Next": partial(self._go_to_key, 1)}
             self._buttons("Go to", go)
             self._ease: Any = gui.add_dropdown("Ease", _EASES)
             on(self._actions, self._ease, lambda ease: self.act(partial(session.set_ease, ease)))
             self._to: Any = gui.add_number("Move to (s)", 0.0, min=0.0, step=0.01)
             self._buttons("This key", {"Move": lambda: session.move_key(float(self._to.value))})
+
+    def _go_to_key(self, steps: int) -> None:
+        self.chosen.choose(None)
+        self._session.go_to_key(steps)
 
     def _add_layers(self) -> None:
         gui = self._gui
@@ -124,7 +129,6 @@ class EditorPanel:
     def _choose_layer(self, label: str) -> None:
         if label in self._layer.options:
             self._session.layer = self._layer.options.index(label)
-            self._shown_version = -1
 
     def _add_layer(self) -> None:
         name = str(self._name.value).strip()
@@ -141,6 +145,7 @@ class EditorPanel:
         gui, session = self._gui, self._session
         with gui.add_folder("Events", expand_by_default=False):
             self._event: Any = gui.add_dropdown("There are", (_NONE,))
+            on(self._actions, self._event, lambda _: self.act(self._choose_event))
             change = {
                 "Go": self._go_to_event,
                 "Move here": lambda: self._edit_event(edits.move_event),
@@ -151,31 +156,34 @@ class EditorPanel:
             self._form = EventForm(gui, session, TRACKS, self._actions)
             self._buttons("At this time", {"Add event": lambda: session.edit(self._form.edit())})
 
-    def _chosen_event(self) -> tuple[str, int] | None:
+    def _listed_event(self) -> Item | None:
         options = list(self._event.options)
         value = self._event.value
-        return self._numbers[options.index(value)] if self._numbers and value in options else None
+        return self._items[options.index(value)] if self._items and value in options else None
+
+    def _choose_event(self) -> None:
+        self.chosen.choose(self._listed_event())
 
     def _edit_event(self, edit: Callable[[str, int, float], edits.Edit]) -> None:
-        if (chosen := self._chosen_event()) is not None:
-            self._session.edit(edit(*chosen, self._session.time))
+        if (item := self._listed_event()) is not None:
+            self._session.edit(edit(item.track, item.number, self._session.time))
 
     def _delete_event(self) -> None:
-        if (chosen := self._chosen_event()) is not None:
-            self._session.edit(edits.delete_event(*chosen))
+        if (item := self._listed_event()) is not None:
+            self._session.edit(edits.delete_event(item.track, item.number))
 
     def _go_to_event(self) -> None:
-        if (chosen := self._chosen_event()) is not None:
-            track, number = chosen
+        if (item := self._listed_event()) is not None:
             self._session.playback.plays = False
-            self._session.playback.seek(float(self._session.document.content[track][number]["at"]))
+            at = self._session.document.content[item.track][item.number]["at"]
+            self._session.playback.seek(float(at))
 
     def show(self) -> None:
         """Show where the session is."""
         session = self._session
         self._take_panel.show()
-        if session.version != self._shown_version:
-            self._shown_version = session.version
+        if (session.version, session.layer) != self._shown:
+            self._shown = (session.version, session.layer)
             self._show_content()
         number = session.key
         if self._takes.run is not None:
@@ -187,6 +195,12 @@ class EditorPanel:
         else:
             what = f"key {number + 1} of {len(session.poses)}"
         text = f"**{as_text(session.document.file.name)}**  \n{session.time:.3f} s, {what}"
+        event = self.chosen.event
+        if event is not None:
+            line = self._describe(event)
+            if self._event.value != line:
+                self._event.value = line
+            text += f"  \nchosen: {as_text(line)}"
         if self._state.content != text:
             self._state.content = text
             self.time.show_time()
@@ -194,6 +208,10 @@ class EditorPanel:
                 self._ease.value = session.poses[number].get("ease", _EASES[0])
         self._ease.disabled = number is None
         self._joint.show()
+
+    def _describe(self, item: Item) -> str:
+        content = self._session.document.content
+        return describe_event(item.track, item.number, content[item.track][item.number])
 
     def _show_content(self) -> None:
         """Have all lists as the document has them."""
@@ -208,10 +226,10 @@ class EditorPanel:
         self._after.value = _STAYS if out == _NEVER else _LEAVES
         self._after.disabled = not names
         self._take_panel.show_settings(content)
-        self._numbers = [
-            (track, number) for track in TRACKS for number in range(len(content.get(track, [])))
+        self._items = [
+            Item(track, number) for track in TRACKS for number in range(len(content.get(track, [])))
         ]
-        lines = [describe_event(*each, content[each[0]][each[1]]) for each in self._numbers]
+        lines = [self._describe(item) for item in self._items]
         chosen = self._event.value
         self._event.options = tuple(lines) or (_NONE,)
         self._event.value = chosen if chosen in lines else self._event.options[0]

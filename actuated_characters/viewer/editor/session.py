@@ -4,7 +4,8 @@ Whoever runs what was made needs nothing of this but the document's file, which 
 newest state.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from msgs_config.character.model import Character
 from msgs_config.errors import MotionError
 
 _RATE = 50.0  # Hz of the times at which keys can be set, beside those of the file
-_LEAST_LENGTH, _ROOM = 5.0, 2.0  # s of the time line; after what is last
+_LENGTHS, _ROOM = 5.0, 1.0  # s: the time line is so long, or a multiple; after what is last
 _SAME = 1e-6  # rad or m by which a joint has not moved
 
 
@@ -45,7 +46,12 @@ class Session:
         """Whether a new key has all joints, or those that the layer has and those that moved."""
         self.version = 0
         """Another one after each change of the document."""
+        self.poses_by_hand = 0
+        """Another one after each pose by hand."""
+        self.seen: Callable[[float], FloatArray | None] = lambda time: None
+        """What is seen in the place of keys at a time in s, such as a take; (n,) message form."""
         self._copied: dict[str, float] | None = None
+        self._longest = _LENGTHS  # s that the time line was long
         self._posed: tuple[float, GeneralizedPosition] | None = None  # and the time of that
         self.preview = Preview(character, document.file)
         self._take_content()
@@ -71,12 +77,18 @@ class Session:
         }
         marked |= {pose["at"] for layer in content.get(KEYS, []) for pose in layer["poses"]}
         given = content.get("duration")
-        last = given if is_number(given) else max(max(marked, default=0.0) + _ROOM, _LEAST_LENGTH)
+        last = given if is_number(given) else self._length(max(marked, default=0.0))
         grid = np.arange(int(last * _RATE + SHORTEST_TIME) + 1) / _RATE
         wanted = np.array(sorted(each for each in marked if 0.0 <= each <= last))
         gaps = np.abs(grid[:, np.newaxis] - wanted) if len(wanted) else np.ones((len(grid), 1))
         times: FloatArray = np.unique(np.append(grid[gaps.min(axis=1) > SHORTEST_TIME], wanted))
         return times if len(times) else np.zeros(1)
+
+    def _length(self, last: float) -> float:
+        """How long the time line is, s, with what is last: so that it is seldom another length."""
+        wanted = _LENGTHS * math.ceil((last + _ROOM) / _LENGTHS - SHORTEST_TIME)
+        self._longest = max(self._longest, wanted)
+        return self._longest
 
     @property
     def time(self) -> float:
@@ -102,7 +114,12 @@ class Session:
 
     @property
     def pose(self) -> GeneralizedPosition:
-        """The pose that is seen: that of a hand, until the time is another one, or of the keys."""
+        """The pose that is seen.
+
+        That of `seen`, or of a hand until the time is another one, or of the keys.
+        """
+        if (position := self.seen(self.time)) is not None:
+            return self.character.layout.configuration(position)
         if self._posed is not None and self._posed[0] == self.time:
             return self._posed[1]
         return self.preview.at(self.time)
@@ -116,6 +133,7 @@ class Session:
         """Have a pose by hand at the present time; the time stands."""
         self.playback.plays = False
         self._posed = (self.time, pose)
+        self.poses_by_hand += 1
 
     def edit(self, edit: Edit) -> bool:
         """Edit the document; whether anything is another now. Raises as `Document.apply`."""

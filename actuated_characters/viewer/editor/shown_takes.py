@@ -22,6 +22,8 @@ class ShownTakes:
         self._file, self._takes = file, takes_of(str(file))
         self._known = self._takes.all()
         self._chosen: Take | None = None
+        self._origin: Take | None = None  # what the next one goes on from; None: the last one
+        self._awaited = False  # whether the one that is being made is to be seen
         self._run: RecordedRun | None = None  # of the chosen one
         self._other: RecordedRun | None = None  # what it is compared with
         self._process: CommandProcess | None = None
@@ -51,8 +53,15 @@ class ShownTakes:
             return
         take = self._find(label)
         self._run = None if take is None else read_run(take.directory)
-        self._chosen = take
+        self._chosen = self._origin = take
         self.version += 1
+
+    def leave(self) -> None:
+        """See the keys, as they are edited; the next take still goes on from the one left."""
+        self._awaited = False
+        if self._chosen is not None:
+            self._run = self._chosen = None
+            self.version += 1
 
     def compare(self, label: str) -> None:
         """See a take as an outline beside. Raises ActuatedCharactersError if it cannot be read."""
@@ -85,7 +94,9 @@ class ShownTakes:
         return None if self._process is None else time.monotonic() - self._begun
 
     def simulate(self, title: str) -> None:
-        """Begin to make a take of the file as it is, from the one that is seen, or the last one.
+        """Begin to make a take of the file as it is, and see it, unless an edit comes first.
+
+        It goes on from the one that is seen, or was until an edit; without one from the last.
 
         Raises:
             MotionError: there is no file yet, or one is being made.
@@ -95,8 +106,9 @@ class ShownTakes:
         if not self._file.exists():
             raise MotionError("there is nothing to simulate yet; set a key first")
         arguments = ["take", str(self._file), f"--title={title}"]
-        if self._chosen is not None:
-            arguments += ["--of", self._chosen.name]
+        if self._origin is not None:
+            arguments += ["--of", self._origin.name]
+        self._awaited = True
         self._process, self._begun = self._ready or CommandProcess(), time.monotonic()
         self._ready = None
         self._process.begin(arguments)
@@ -128,8 +140,12 @@ class ShownTakes:
         new = [take for take in self._known if take.name not in before]
         if error or not new:
             return error or next((line for line in words if line.startswith("nothing")), "")
+        said = " ".join(line for line in words if line.startswith(("take ", "it falls")))
+        if not self._awaited:
+            self._origin = new[-1]
+            return f"{said}; choose it in Seen"
         self.choose(_describe(new[-1]))
-        return " ".join(line for line in words if line.startswith(("take ", "it falls")))
+        return said
 
 
 def _describe(take: Take) -> str:

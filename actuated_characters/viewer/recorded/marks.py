@@ -25,7 +25,8 @@ class Mark:
     text: str
     label: str = ""  # what stands on a span
     color: str = ""  # of a mode, as a page has it
-    lane: int = 0  # number of the character that has the mode
+    lane: int = 0  # number of the character that has the mode, or of the row below others
+    item: str = ""  # what it is called where it can be dragged; empty: it cannot
 
 
 def find_marks(run: RecordedRun) -> list[Mark]:

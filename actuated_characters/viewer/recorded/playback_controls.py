@@ -36,7 +36,7 @@ class PlaybackControls:
 
     def _seek(self, time: float) -> None:
         self._timeline.plays = False
-        self._timeline.seek(time)
+        self._timeline.seek_nearest(time)
 
     def move(self, button: str) -> None:
         """Do what a button says."""

@@ -1,6 +1,7 @@
 // The time line at the bottom of a recorded run's page; time_bar.py says how it is connected.
 (() => {
   const FRAME = "/time_line", ADDRESS = "/time_line.json";
+  const MODES = 14, LEAST_LABEL = 11, ROW = 10; // pixels: all modes, one with its name, a row of keys
   const NEAR = 5; // pixels between the pointer and a mark that it means
   const SEND_PERIOD = 40; // ms between two times that are sent during a drag
   const LEAP = 0.1; // s that an arrow key goes with Shift
@@ -32,19 +33,23 @@
   const share = at => (at - told.first) / Math.max(told.last - told.first, 1e-9);
   const percent = at => `${100 * Math.min(Math.max(share(at), 0), 1)}%`;
 
+  const most = kinds => Math.max(0, ...told.marks.filter(({ kind }) => kinds(kind)).map(({ lane }) => lane));
+  const lanes = () => 1 + most(kind => kind === "mode");
+  const modes = () => told.laneHeight ? told.laneHeight * lanes() : MODES;
+
   function draw(mark, ghost) {
     const isMode = mark.kind === "mode";
     const made = make(isMode ? "div" : "button", `${isMode ? "" : "mark "}${mark.kind}`, track);
+    if (mark.item) made.dataset.item = mark.item;
     made.style.left = percent(mark.start);
     if (mark.end > mark.start) made.style.width = `calc(${percent(mark.end)} - ${percent(mark.start)})`;
     if (ghost) made.classList.add("ghost");
     if (isMode) { // of several characters one below the other
-      const lanes = 1 + Math.max(...told.marks.map(({ lane }) => lane));
-      const [top, height] = ghost ? [43, 11] : [0, 14];
-      made.style.cssText += `background: ${mark.color}; top: ${top + height * mark.lane / lanes}px;
-        height: ${height / lanes}px`;
-      if (lanes === 1) made.textContent = mark.label;
-    }
+      const count = lanes(), [top, height] = ghost ? [modes() + 29, 11] : [0, modes()];
+      made.style.cssText += `background: ${mark.color}; top: ${top + height * mark.lane / count}px;
+        height: ${height / count}px`;
+      if (height / count >= LEAST_LABEL) made.textContent = mark.label;
+    } else if (mark.lane) made.style.marginTop = `${ROW * mark.lane}px`;
     made.dataset.made = "";
     if (!isMode) {
       made.setAttribute("aria-label", `${mark.start.toFixed(2)} s: ${ghost}${mark.text}`);
@@ -67,10 +72,13 @@
     for (const wanted of [true, false])
       all.filter(([each]) => (each.kind === "mode") === wanted).forEach(each => draw(...each));
     track.classList.toggle("two", told.ghostMarks.length > 0);
+    track.style.setProperty("--modes", `${modes()}px`);
+    track.style.setProperty("--rows", `${ROW * most(kind => kind !== "mode")}px`);
     rail.setAttribute("aria-valuemin", told.first);
     rail.setAttribute("aria-valuemax", told.last);
     track.append(now, tip);
     bar.hidden = false;
+    bar.dispatchEvent(new Event("marks"));
   }
 
   const timeOf = event => {
@@ -95,14 +103,17 @@
     document.activeElement?.blur(); // or a field of the panel would keep the keys
     event.preventDefault();
   };
-  track.onpointermove = event => {
-    const at = timeOf(event), texts = marksNear(at).map(({ text }) => text);
+  function say(at, texts) {
     tip.style.display = "block";
     tip.style.left = percent(at);
     tip.textContent = [`${at.toFixed(2)} s`, ...texts].join("\n");
-    const over = tip.getBoundingClientRect(), most = bar.getBoundingClientRect();
-    const aside = Math.max(most.left - over.left, 0) + Math.min(most.right - over.right, 0);
+    const over = tip.getBoundingClientRect(), room = bar.getBoundingClientRect();
+    const aside = Math.max(room.left - over.left, 0) + Math.min(room.right - over.right, 0);
     tip.style.left = `calc(${percent(at)} + ${aside}px)`;
+  }
+  track.onpointermove = event => {
+    const at = timeOf(event);
+    say(at, marksNear(at).map(({ text }) => text));
     if (drags && performance.now() - sentAt > SEND_PERIOD) {
       sentAt = performance.now();
       seek(at);
@@ -120,12 +131,12 @@
     Home: () => press("Start"),
     End: () => press("End"),
   };
+  // A control that the keyboard has come to keeps its keys; a button that was clicked does not.
+  const isFree = ({ target }) => bar.contains(target)
+    || !target.closest?.(`${NOT_OURS}, button:focus-visible`);
   addEventListener("keydown", event => {
-    const act = KEYS[event.key], at = event.target;
-    if (!act || !told || event.ctrlKey || event.metaKey || event.altKey) return;
-    // A control that the keyboard has come to keeps its keys; a button that was clicked does not.
-    const isOurs = bar.contains(at);
-    if (!isOurs && at.closest?.(`${NOT_OURS}, button:focus-visible`)) return;
+    const act = KEYS[event.key];
+    if (!act || !told || event.ctrlKey || event.metaKey || event.altKey || !isFree(event)) return;
     event.preventDefault();
     event.stopPropagation(); // or viser would turn the camera by the arrow keys
     act(event.shiftKey);
@@ -158,12 +169,16 @@
     spoken = line + plays;
     shown.textContent = line;
     now.style.left = percent(time);
+    bar.dispatchEvent(new Event("time"));
     play.textContent = plays ? "❚❚" : "▶";
     play.setAttribute("aria-label", plays ? "Pause" : "Play");
     const mode = told.marks.find(({ kind, start, end }) => kind === "mode" && start <= time && time < end);
     rail.setAttribute("aria-valuenow", time.toFixed(3));
     rail.setAttribute("aria-valuetext", `${time.toFixed(3)} s${mode ? `, ${mode.label}` : ""}`);
   }
+  // for scripts that come after this one
+  window.timeLine = { bar, track, tip, update, seek, percent, say, timeOf, isFree,
+    get told() { return told; }, get time() { return time; } };
   addEventListener("DOMContentLoaded", () => {
     document.body.append(bar);
     setInterval(place, 250);

@@ -42,8 +42,17 @@ class TimeBar:
             "playback": controls.buttons._impl.uuid,
         }
         self._text = "{}"
+        self._server = server
         server.parts.files += _FILES
         server.parts.texts[_ADDRESS] = lambda: self._text
+
+    def add_files(self, files: Sequence[Path]) -> None:
+        """Give pages more scripts and styles, for which `timeLine` is in the page."""
+        self._server.parts.files += files
+
+    def tell(self, **values: Any) -> None:
+        """Have scripts find these values, from the next `mark` on, in `timeLine.told`."""
+        self._told.update(values)
 
     def mark(self, marks: Sequence[Mark], ghost: str = "", of_ghost: Sequence[Mark] = ()) -> None:
         """Show these marks, and below them those of a ghost, if it has a name.

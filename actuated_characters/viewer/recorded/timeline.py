@@ -37,6 +37,15 @@ class Playback:
         """Go to a time, or to the nearest end."""
         self._time = min(max(time, float(self.times[0])), self.end)
 
+    def seek_nearest(self, time: float) -> None:
+        """Go to the state nearest to a time, where a hand has pointed; of two to the later one."""
+        self.seek(time)
+        before = self.row
+        after = min(before + 1, len(self.times) - 1)
+        if self.times[after] - self._time <= self._time - self.times[before]:
+            before = after
+        self._time = float(self.times[before])
+
     def step(self, ticks: int) -> None:
         """Stand, so many states ahead, or back if it is negative."""
         self.plays = False

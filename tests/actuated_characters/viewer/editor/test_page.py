@@ -136,8 +136,8 @@ def test_the_time_line_grows_with_what_is_on_it(page: EditorPage, session: Sessi
     session.playback.seek(5.0)
     click(page, "Key")
 
-    assert told(page)["last"] == pytest.approx(7.0)
-    assert page._panel.time.slider.max == pytest.approx(7.0)
+    assert told(page)["last"] == pytest.approx(10.0)
+    assert page._panel.time.slider.max == pytest.approx(10.0)
 
 
 def test_a_joint_is_set_by_its_number_within_its_limits(page: EditorPage, session: Session) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from actuated_characters.bags.whole import read_whole
+from actuated_characters.timeline import edits
 from actuated_characters.timeline.document import Document
 from actuated_characters.timeline.takes import takes_of
 from actuated_characters.viewer.editor.page import EditorPage
@@ -75,6 +76,50 @@ def test_a_take_is_made_seen_and_compared_with_another(page: EditorPage, file: P
     sample = page.takes.sample(0.6)
     assert sample is not None and sample.reference is not None
     np.testing.assert_array_equal(sample.reference, recording.position[-1])
+
+
+@pytest.mark.slow
+def test_what_is_edited_is_seen_and_the_next_take_goes_on_from_the_one_before(
+    page: EditorPage,
+) -> None:
+    session, push = page._session, {"at": 0.5, "link": "chest", "force": [0.0, 300.0, 0.0]}
+    seen = page._panel._take_panel._take
+    click(page, "Simulate")
+    finish(page)
+    session.edit(edits.add_event("pushes", push))
+    page.step(0.0)
+    assert (page.takes.chosen, page.takes.run, seen.value) == (NO_TAKE, None, NO_TAKE)
+    click(page, "Simulate")
+    finish(page)
+    assert page.takes.chosen == "2, of 1"
+
+    page.takes.choose("1")
+    page.step(0.0)
+    session.edit(edits.move_event("pushes", 0, 0.4))
+    page.step(0.0)
+    click(page, "Simulate")
+    page.step(0.0)
+    session.edit(edits.move_event("pushes", 0, 0.3))
+    finish(page)
+
+    assert [take.parent for take in takes_of(str(session.document.file)).all()] == ["", "1", "1"]
+    assert page.takes.chosen == NO_TAKE, "it was edited meanwhile"
+    assert "choose it in Seen" in page._panel._told.content
+
+
+@pytest.mark.slow
+def test_a_key_has_the_pose_of_the_take_that_is_seen(page: EditorPage) -> None:
+    click(page, "Simulate")
+    finish(page)
+    page._session.playback.seek(0.4)
+    page.step(0.0)
+    seen = page.takes.position(page._session.time)
+    assert seen is not None
+
+    click(page, "Key")
+
+    assert page.takes.chosen == NO_TAKE
+    assert list(page._session.poses[0]["pose"].values()) == pytest.approx(seen, abs=2e-6)
 
 
 @pytest.mark.slow

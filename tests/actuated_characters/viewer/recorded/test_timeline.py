@@ -34,6 +34,13 @@ def test_each_state_is_shown_at_its_own_time(row: int) -> None:
     assert timeline.row == row
 
 
+@given(st.floats(-1.0, 2.0))
+def test_where_a_hand_points_the_nearest_state_is_shown(time: float) -> None:
+    timeline = Playback(TIMES)
+    timeline.seek_nearest(time)
+    assert abs(timeline.time - time) == pytest.approx(np.abs(TIMES - time).min(), abs=1e-12)
+
+
 @pytest.mark.parametrize(("speed", "row"), [(1.0, 60), (0.1, 6), (2.0, 120)])
 def test_it_plays_at_its_speed(speed: float, row: int) -> None:
     timeline = playing(speed)
