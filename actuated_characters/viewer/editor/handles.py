@@ -59,8 +59,9 @@ def standing_links(character: Character, pose: GeneralizedPosition) -> tuple[str
 class Drag:
     """A point of a link that follows the pointer, from the pose in which it was taken.
 
-    Links that stand stay where they are, but for the one that is dragged. Without any the base
-    stays, unless it is the one.
+    Of an arm or a leg the limb goes there alone, as far as it can; what is then missing is done by
+    the whole body, from there on. Links that stand stay where they are, but for the one that is
+    dragged. Without any the base stays, unless it is the one.
     """
 
     def __init__(
@@ -75,52 +76,74 @@ class Drag:
     ) -> None:
         """`limb_alone`: nothing moves but the limb that the link is of; `stands`: links."""
         self._posing, self._pose, self._last = posing, pose, pose
-        self._link, self._point = character.links[handle.row].name, handle.point
+        self._row, self._point = handle.row, handle.point
+        self._link = character.links[handle.row].name
+        self._is_base = character.links[handle.row].parent < 0
         self._holds = tuple(name for name in stands if name != self._link)
+        self._limb = self._find_limb(character, limb_alone=limb_alone)
+        self._has_body = self._limb is None or not limb_alone
+        self._free = self._find_free(character)
         self._bends = self._find_bends(character)
-        self._free = self._find_free(character, handle, limb_alone=limb_alone)
         self.place = posing.place(pose, self._link, handle.point)
         """Where the point was (3,), m, world."""
 
+    def _find_limb(self, character: Character, *, limb_alone: bool) -> BoolArray | None:
+        """The degrees of freedom (n,) that go first; None of what is of no limb, or carries."""
+        if self._is_base:
+            return None
+        layout, limb = character.layout, self._posing.chain(self._link)
+        joints = [each for each in layout.joints if limb[each.entries].any()]
+        carries = any((limb & self._posing.chain(name)).any() for name in self._holds)
+        own = character.links[self._row].joint
+        if own.type is JointType.SPHERICAL and self._row in character.end_effectors and joints[1:]:
+            limb &= ~layout.mask([own.name])  # a foot keeps its turn against the leg
+        return limb if limb_alone or (len(joints) > 1 and not carries) else None
+
+    def _find_free(self, character: Character) -> BoolArray | None:
+        """The degrees of freedom (n,) of the whole body; None: all."""
+        layout = character.layout
+        if not layout.has_floating_base or self._holds:
+            return None
+        root = layout.mask([layout.joints[0].name])
+        return root if self._is_base else ~root
+
     def _find_bends(self, character: Character) -> FloatArray:
-        """How far the hinges of the limb go (n,), rad, to be bent into their range."""
+        """How far hinges go (n,), rad, to be bent into their range: of limbs that may have to."""
         layout, position = character.layout, self._pose.position
         lower, upper = character.position_bounds()
         hinges = [each.name for each in layout.joints if each.type is JointType.REVOLUTE]
-        bent = self._posing.chain(self._link) & layout.mask(hinges)
+        limbs = [self._posing.chain(name) for name in (self._link, *self._holds)]
+        bent = np.any(limbs, axis=0) & layout.mask(hinges)
         inwards = upper - position >= position - lower
         bends: FloatArray = np.where(bent, np.where(inwards, _BEND_RAD, -_BEND_RAD), 0.0)
         return bends
 
-    def _find_free(
-        self, character: Character, handle: Handle, *, limb_alone: bool
-    ) -> BoolArray | None:
-        layout = character.layout
-        is_base = character.links[handle.row].parent < 0
-        if limb_alone and not is_base:
-            self._holds = ()
-            return self._posing.chain(self._link)
-        if not layout.has_floating_base or self._holds:
-            return None
-        root = layout.mask([layout.joints[0].name])
-        return root if is_base else ~root
-
     def pose(self, place: FloatArray) -> GeneralizedPosition:
         """The pose with the point at a place (3,), m, world, or as near as it can come."""
         x, y, z = place.tolist()
-        target = Target(self._link, (x, y, z), self._point)
-        found = self._fit(target, self._last)
-        if not found.reached:
-            # no small turn of a straight limb brings its end nearer to its root: it is bent first
-            last = self._last
-            bent = GeneralizedPosition(last.position + self._bends, last.orientations_xyzw)
-            other = self._fit(target, bent)
-            if other.residual < found.residual - REACHED_M:
-                found = other
+        target, near = Target(self._link, (x, y, z), self._point), self._pose
+        if self._limb is not None:
+            found = self._fit(near, target, self._limb, ())
+            near = found.pose
+        if self._has_body and (self._limb is None or not found.reached):
+            found = self._fit(near, target, self._free, self._holds)
         self._last = found.pose
         return found.pose
 
-    def _fit(self, target: Target, start: GeneralizedPosition) -> Posed:
-        return self._posing.fit(
-            self._pose, [target], free=self._free, holds=self._holds, start=start
-        )
+    def _fit(
+        self,
+        near: GeneralizedPosition,
+        target: Target,
+        free: BoolArray | None,
+        holds: Sequence[str],
+    ) -> Posed:
+        """The nearest pose to one; a straight limb is bent first where that helps."""
+        last = self._last
+        found = self._posing.fit(near, [target], free=free, holds=holds, start=last)
+        if not found.reached:
+            # no small turn of a straight limb brings its end nearer to its root
+            bent = GeneralizedPosition(last.position + self._bends, last.orientations_xyzw)
+            other = self._posing.fit(near, [target], free=free, holds=holds, start=bent)
+            if other.residual < found.residual - REACHED_M:
+                found = other
+        return found

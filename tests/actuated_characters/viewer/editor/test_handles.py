@@ -117,3 +117,74 @@ def test_a_straight_arm_bends_where_its_hand_is_dragged_nearer(
         wanted = begin + share * np.array(way)
         place = POSING.place(held.pose(wanted), "right_wrist", point)
         assert place == pytest.approx(wanted, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [(0.0, 0.0, 0.2), (0.3, 0.0, 0.2), (0.5, 0.0, 0.4), (0.0, -0.4, 0.3), (0.1, 0.1, 0.5)],
+)
+def test_an_arm_that_is_long_enough_moves_alone(way: tuple[float, float, float]) -> None:
+    """Of a pose that the arm alone can have, the trunk has no share."""
+    pose = rest(HUMANOID)
+    whole, alone = drag("right_wrist", pose), drag("right_wrist", pose, limb_alone=True)
+
+    for share in np.linspace(0.1, 1.0, 10):
+        wanted = whole.place + share * np.array(way)
+        found, expected = whole.pose(wanted), alone.pose(wanted)
+        place = POSING.place(found, "right_wrist", handle_of("right_wrist").point)
+        assert place == pytest.approx(wanted, abs=1e-3)
+        assert found.position.tolist() == expected.position.tolist()
+
+
+def test_the_trunk_follows_once_the_arm_is_straight_and_without_a_jump() -> None:
+    pose = rest(HUMANOID)
+    held, names = drag("right_wrist", pose), [link.name for link in HUMANOID.links]
+    elbow, trunk = (HUMANOID.layout.joint(name) for name in ("right_elbow", "chest"))
+    step, before = np.array((0.8, 0.0, 0.5)) / 80.0, None
+    leant = 0
+
+    for number in range(1, 81):
+        found = held.pose(held.place + number * step)
+        places = np.array([POSING.frame(found, name)[0] for name in names])
+        if before is not None:
+            assert np.linalg.norm(places - before, axis=1).max() < 5.0 * np.linalg.norm(step)
+        before = places
+        if np.abs(found.position[trunk.entries] - pose.position[trunk.entries]).max() > 0.02:
+            leant += 1
+            assert np.degrees(found.position[elbow.start]) < 15.0
+
+    assert 0 < leant < 40
+
+
+def test_a_foot_that_is_lifted_bends_its_knee_and_leaves_the_rest() -> None:
+    pose = rest(HUMANOID)
+    held = drag("right_ankle", pose)
+
+    found = held.pose(held.place + np.array((0.0, 0.0, 0.2)))
+
+    leg = POSING.chain("right_ankle")
+    assert found.position[~leg].tolist() == pose.position[~leg].tolist()
+    assert abs(found.position[HUMANOID.layout.joint("right_knee").start]) > 0.5
+    foot = POSING.place(found, "right_ankle", handle_of("right_ankle").point)
+    assert foot == pytest.approx(held.place + np.array((0.0, 0.0, 0.2)), abs=1e-3)
+
+
+def test_the_pelvis_goes_down_onto_bent_knees_above_the_same_feet() -> None:
+    pose = rest(HUMANOID)
+    held = drag("base", pose)
+
+    found = held.pose(held.place - np.array((0.0, 0.0, 0.2)))
+
+    assert found.position[2] == pytest.approx(pose.position[2] - 0.2, abs=5e-3)
+    for foot in HUMANOID.feet:
+        assert POSING.frame(found, foot)[0] == pytest.approx(POSING.frame(pose, foot)[0], abs=1e-3)
+
+
+def test_a_knee_above_a_foot_that_stands_leaves_that_where_it_is() -> None:
+    pose = rest(HUMANOID)
+    held = drag("right_knee", pose)
+
+    found = held.pose(held.place + np.array((0.1, -0.05, 0.0)))
+
+    place = POSING.frame(found, "right_ankle")[0]
+    assert place == pytest.approx(POSING.frame(pose, "right_ankle")[0], abs=1e-3)
