@@ -7,7 +7,7 @@ from controller_node import parameters as controller_parameters
 from controller_node.references.base import Reference
 from controller_node.references.hold import HoldReference
 from controller_node.references.timeline.file import make_timeline
-from controller_node.references.timeline.motion import timeline_motion
+from controller_node.references.timeline.motion import TimelineReference, timeline_motion
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
 from msgs_config.errors import ActuatedCharactersError
@@ -19,6 +19,8 @@ class Preview:
     def __init__(self, character: Character, file: Path) -> None:
         self._character, self._file = character, file
         self._motion: Reference = HoldReference(character)
+        self.end = 0.0
+        """When the motion is over, s: at the last key, or once it stands after steering."""
         self.errors: tuple[str, ...] = ()
         """What cannot be played of the content, and why; or what cannot be reached."""
 
@@ -33,7 +35,8 @@ class Preview:
         except ActuatedCharactersError as error:
             self.errors = (str(error).removeprefix(f"{self._file}: "),)
             return
-        self._motion = motion.reference
+        assert isinstance(motion.reference, TimelineReference)
+        self._motion, self.end = motion.reference, motion.reference.still
         self.errors = tuple(each.removeprefix(f"{self._file}: ") for each in motion.warnings)
 
     def at(self, time: float) -> GeneralizedPosition:

@@ -108,7 +108,7 @@ def _default_duration(plan: RunPlan) -> float:
     """The length in s of a run of a timeline that says none: until all of it is over, and a bit."""
     assert isinstance(plan.reference, TimelineReference)
     timeline = plan.reference.timeline
-    over = [plan.reference.end]
+    over = [plan.reference.still]
     over += [each.until for each in timeline.strengths]
     over += [each.until for each in timeline.pins]
     over += [each.at + (each.duration or 0.0) for each in timeline.pushes]

@@ -77,7 +77,8 @@ class Session:
         }
         marked |= {pose["at"] for layer in content.get(KEYS, []) for pose in layer["poses"]}
         given = content.get("duration")
-        last = given if is_number(given) else self._length(max(marked, default=0.0))
+        over = max([self.preview.end, *marked])
+        last = given if is_number(given) else self._length(over)
         grid = np.arange(int(last * _RATE + SHORTEST_TIME) + 1) / _RATE
         wanted = np.array(sorted(each for each in marked if 0.0 <= each <= last))
         gaps = np.abs(grid[:, np.newaxis] - wanted) if len(wanted) else np.ones((len(grid), 1))

@@ -26,6 +26,7 @@ from msgs_config.geometry import rotations
 
 _WINDOW = 1024  # ticks that are remembered: many more than a planner's horizon
 _MAX_WAITING = 1000  # commands
+_LONGEST_STOP = 10  # s that are looked ahead for a stop
 _LEAN_SHARE_AHEAD = 0.5  # share of the full lean ahead
 
 
@@ -146,6 +147,18 @@ class SteeredReference:
             if len(self._courses) > 2 * _WINDOW:
                 self._first, self._courses = self._first + _WINDOW, self._courses[_WINDOW:]
         return self._courses[max(tick - self._first, 0)]
+
+    def standing_from(self, tick: int) -> int:
+        """The first tick, from one on at which a stop is in force, at which it stands still.
+
+        It steps on until its feet are where it stands at ease.
+        """
+        at, course = self._start  # apart from the course that is remembered
+        last = tick + _LONGEST_STOP * self._rate
+        while at < tick or (at < last and (course.is_moving or course.pace > 0.0)):
+            at += 1
+            course = self._advanced(course, at)
+        return at
 
     def _advanced(self, course: Course, tick: int) -> Course:
         """The course at a tick, from that of the tick before."""

@@ -65,13 +65,16 @@ class _Still:
 
 
 class GroundMaker:
-    """Makes the track of a timeline's clips and steering; `end` is when all of it is over, s."""
+    """Makes the track of a timeline's clips and steering.
+
+    `end` is when all of it is over, s; `still`, when it stands after that.
+    """
 
     def __init__(self, character: Character, values: Values, timeline: Timeline) -> None:
         self._character, self._values, self._timeline = character, values, timeline
         self._rate = SharedSettings.of(values).rate
         self._track = GroundTrack(character.layout, HoldReference(character))
-        self.end = 0.0
+        self.end = self.still = 0.0
         self.clamped = list[str]()  # degrees of freedom that had to be kept within their limits
 
     def make(self) -> GroundTrack:
@@ -149,6 +152,9 @@ class GroundMaker:
         moved = TransformedReference(self._character.layout, steered, carry, start)
         self._track.go_over(moved, start, first.blend)
         self.end = max(self.end, group[-1].until)
+        if then is None:  # nothing cuts off how it comes to stand
+            stops = round((group[-1].until - start) * self._rate)
+            self.still = start + steered.standing_from(stops) / self._rate
 
     def _commands(
         self, group: Sequence[SteeringEntry], steered: SteeredReference, start: float

@@ -31,9 +31,9 @@ class TimelineReference(OnePart):
     A controller goes on from a keyframe with an edited timeline in its place.
     """
 
-    def __init__(self, timeline: Timeline, motion: Reference, end: float) -> None:
-        """`end` is when all of the motion is over, s."""
-        self.timeline, self.end = timeline, end
+    def __init__(self, timeline: Timeline, motion: Reference, end: float, still: float) -> None:
+        """`end` is when all that the timeline says is over, s; `still`, when it stands then."""
+        self.timeline, self.end, self.still = timeline, end, max(end, still)
         self._motion = motion
         self._known: dict[float, ReferenceState] = {}
 
@@ -71,7 +71,8 @@ def timeline_motion(character: Character, values: Values, timeline: Timeline) ->
     end = max([end, *(each.until + each.go for each in (*timeline.reaches, *timeline.looks))])
     clamped = ", ".join(dict.fromkeys(maker.clamped))
     warnings = (f"kept within joint limits: {clamped}",) if clamped else ()
-    return Motion(TimelineReference(timeline, motion, end), (*warnings, *targets.warnings))
+    reference = TimelineReference(timeline, motion, end, maker.still)
+    return Motion(reference, (*warnings, *targets.warnings))
 
 
 @REFERENCES.register("timeline", TimelineSettings)

@@ -113,6 +113,17 @@ def test_it_lasts_until_all_is_over(tmp_path: Path) -> None:
     assert planned(tmp_path, content, "--duration", "4").plan.ticks == 4 * RATE
 
 
+def test_after_steering_it_lasts_until_the_character_stands(tmp_path: Path) -> None:
+    steering = [{"at": 0.5, "until": 2.0, "velocity": [0.8, 0.0, 0.0]}]
+
+    plan = planned(tmp_path, {"run": ASSISTED, "steering": steering}).plan
+
+    seconds = plan.ticks / RATE
+    last = [plan.reference.sample(seconds - ago).configuration.position for ago in (0.0, 0.5, 1.0)]
+    np.testing.assert_allclose(last[1:], last[:1] * 2, atol=2e-3)
+    assert 2.0 < seconds < 6.0
+
+
 def test_strengths_that_overlap_multiply_and_are_written_and_read(tmp_path: Path) -> None:
     content = {
         "run": ASSISTED,

@@ -45,3 +45,14 @@ def test_what_cannot_be_played_is_said_and_the_motion_stays() -> None:
     assert preview.at(1.0).position[ELBOW] == pytest.approx(1.0)
     preview.take({"reach": [{"at": 0, "until": 1, "link": "left_wrist", "point": [5, 0, 1]}]})
     assert "short of its point" in preview.errors[0]
+
+
+def test_it_is_over_once_the_character_stands_after_steering() -> None:
+    preview = Preview(HUMANOID, Path("a.yaml"))
+    preview.take({"steering": [{"at": 1.0, "until": 2.2, "velocity": [0.8, 0.0, 0.0]}]})
+
+    assert preview.end > 2.2
+    there = preview.at(preview.end).position
+    np.testing.assert_allclose(there, preview.at(preview.end + 5.0).position, atol=2e-3)
+    knees = [HUMANOID.layout.joint(name).start for name in ("left_knee", "right_knee")]
+    np.testing.assert_allclose(there[knees], 0.0, atol=0.01)

@@ -268,6 +268,22 @@ def test_steering_goes_on_from_where_the_character_is_at_the_speed_that_is_said(
     assert reference.end == 6.0
 
 
+def test_after_steering_it_stands_still_a_while_later(tmp_path: Path) -> None:
+    steering = [{"at": 2.0, "until": 6.0, "velocity": [1.2, 0.0, 0.0]}]
+    reference = made(tmp_path, steering=steering)
+
+    def moves(start: float, end: float) -> float:
+        """The most that any degree of freedom goes, rad or m."""
+        places = [reference.sample(t).configuration.position for t in np.arange(start, end, 0.05)]
+        return float(np.ptp(places, axis=0).max())
+
+    assert 6.0 < reference.still < 9.0
+    assert moves(reference.still, reference.still + 2.0) < 2e-3
+    assert moves(reference.still - 0.5, reference.still) > 0.02
+    then = made(tmp_path, steering=steering, clips=[{**WALK, "at": 7.0, "to": 1.0}])
+    assert then.still == pytest.approx(7.8)
+
+
 def test_states_are_the_same_however_often_and_in_which_order_they_are_asked_for(
     tmp_path: Path,
 ) -> None:
