@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -41,6 +42,9 @@ def add_take(commands: "Commands[argparse.ArgumentParser]") -> None:
         "--from-start", action="store_true", help="go on from none: simulate all of it"
     )
     take.add_argument("--title", default="", metavar="TEXT", help="what is said of it in the list")
+    take.add_argument(
+        "--progress", action="store_true", help="say how far it is in lines, as for programs"
+    )
     take.add_argument("--list", action="store_true", help="list the takes there are, and end")
 
 
@@ -62,6 +66,20 @@ def _take(options: argparse.Namespace) -> None:
         return
     check_interruption()  # all modules are imported by now
     begun = time.monotonic()
+    if options.progress:
+        take = make_take(planned, options.title, partial(_say_progress, planned))
+    else:
+        take = _make_with_bar(planned, options)
+    _report(planned, take, time.monotonic() - begun)
+
+
+def _say_progress(planned: "PlannedTake", at: float) -> None:
+    print(f"simulated {min(at, planned.until):.2f} of {planned.until:g} s", flush=True)
+
+
+def _make_with_bar(planned: "PlannedTake", options: argparse.Namespace) -> "Take":
+    from actuated_characters.timeline.taking import make_take
+
     length = planned.until - planned.begin
     with progress_bar(f"{options.file}: take", length, "s") as bar:
 
@@ -71,7 +89,7 @@ def _take(options: argparse.Namespace) -> None:
 
         take = make_take(planned, options.title, progress)
         progress(planned.until)
-    _report(planned, take, time.monotonic() - begun)
+    return take
 
 
 def _parent(takes: "Takes", name: str | None) -> "Take | None":

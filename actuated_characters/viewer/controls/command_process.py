@@ -1,6 +1,7 @@
 """A command in a process beside the viewer, which does not wait for its end."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 _MODULE, _PREPARED = "actuated_characters.cli", "actuated_characters.prepared_main"
+_LONGEST_LINE = 512  # bytes of a last line
 _PATIENCE = 10.0  # s in which a command can end in good order
 
 
@@ -47,8 +49,17 @@ class CommandProcess:
         errors = [line for line in self.lines() if line.startswith("error: ")]
         return (errors or self.lines() or ["error: it has failed"])[-1]
 
+    @property
+    def last_line(self) -> str:
+        """What it has said last; it may go on to say more."""
+        # reading at a position leaves that at which the process writes, which is shared with it
+        place = self._output.fileno()
+        begin = max(os.fstat(place).st_size - _LONGEST_LINE, 0)
+        words = os.pread(place, _LONGEST_LINE, begin).decode(errors="replace").splitlines()
+        return words[-1] if words else ""
+
     def lines(self) -> list[str]:
-        """What it has said so far."""
+        """What it has said; only once it has ended."""
         self._output.seek(0)
         return self._output.read().decode(errors="replace").splitlines()
 

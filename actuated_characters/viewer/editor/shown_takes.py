@@ -13,6 +13,7 @@ from msgs_config.arrays import FloatArray
 from msgs_config.errors import MotionError
 
 NO_TAKE = "none: the keys"
+_SIMULATED = "simulated "
 
 
 class ShownTakes:
@@ -93,6 +94,12 @@ class ShownTakes:
         """For how long a take has been made, s of wall time; None: none is."""
         return None if self._process is None else time.monotonic() - self._begun
 
+    @property
+    def simulated(self) -> str:
+        """How far the take is that is being made, as its command says it; empty before it says."""
+        said = "" if self._process is None else self._process.last_line
+        return said if said.startswith(_SIMULATED) else ""
+
     def simulate(self, title: str) -> None:
         """Begin to make a take of the file as it is, and see it, unless an edit comes first.
 
@@ -105,7 +112,7 @@ class ShownTakes:
             raise MotionError("a take is being made; cancel it first")
         if not self._file.exists():
             raise MotionError("there is nothing to simulate yet; set a key first")
-        arguments = ["take", str(self._file), f"--title={title}"]
+        arguments = ["take", str(self._file), f"--title={title}", "--progress"]
         if self._origin is not None:
             arguments += ["--of", self._origin.name]
         self._awaited = True

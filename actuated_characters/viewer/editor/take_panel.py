@@ -78,7 +78,7 @@ class TakePanel:
             self._tell(said)
         seconds = self._takes.making
         if seconds is not None:
-            self._tell(f"simulating for {seconds:.0f} s")
+            self._tell(f"{self._takes.simulated or 'preparing'}, for {seconds:.0f} s")
         if self._shown == self._takes.version:
             return
         self._shown = self._takes.version

@@ -54,6 +54,19 @@ def test_takes_are_made_listed_and_go_on_from_each_other(
     ]
 
 
+@pytest.mark.slow
+def test_how_far_it_is_is_said_in_lines_for_programs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["take", written(tmp_path), "--progress"]) == 0
+
+    lines = capsys.readouterr().out.splitlines()
+    said = [re.fullmatch(r"simulated (\d+\.\d+) of 0\.6 s", line) for line in lines]
+    times = [float(each[1]) for each in said if each]
+    assert times and times == sorted(times)
+    assert times[0] >= 0.0 and times[-1] <= 0.6
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -40,20 +40,23 @@ def page(file: Path) -> Iterator[EditorPage]:
         page.takes.close()
 
 
-def finish(page: EditorPage) -> None:
-    """Go on until the take is there."""
-    end = time.monotonic() + DEADLINE
+def finish(page: EditorPage) -> set[str]:
+    """Go on until the take is there; returns what was said meanwhile."""
+    end, said = time.monotonic() + DEADLINE, set[str]()
     while page.takes.making is not None and time.monotonic() < end:
         page.step(0.0)
+        said.add(page._panel._told.content)
         time.sleep(0.05)
     assert page.takes.making is None
     page.step(0.0)
+    return said
 
 
 @pytest.mark.slow
 def test_a_take_is_made_seen_and_compared_with_another(page: EditorPage, file: Path) -> None:
     click(page, "Simulate")
-    finish(page)
+    said = finish(page)
+    assert any(line.startswith("simulated 0.") and "of 0.6 s" in line for line in said)
     assert page.takes.chosen == "1"
     assert "take 1: 0.6 s from the beginning" in page._panel._told.content
     page._session.playback.seek(0.4)
