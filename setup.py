@@ -39,6 +39,7 @@ setup(
         "actuated_characters": [
             "scenes/*.yaml",
             "scenes/data/*",
+            "viewer/editor/time_edits.*s",
             "viewer/recorded/time_bar.*s",
         ],
     },
