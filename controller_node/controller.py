@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller_node.balance import BalanceController
+from controller_node.behaviours.asked import ASKABLE, AskedBehaviour, behaviour_schedule
 from controller_node.behaviours.base import (
     BehaviourChoice,
     BehaviourOutput,
@@ -29,7 +30,7 @@ from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import VelocityCommand
 from controller_node.references.trajectory import TrajectoryPoints
 from controller_node.references.transformed import PlanarTransform
-from controller_node.strength import Strengths, StrengthSchedule
+from controller_node.strength import Strengths, strength_schedule
 from controller_node.tracked_reference import TrackedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -112,7 +113,8 @@ class Controller:
         self.mode: ModeReport | None = None  # since which state which mode holds
         self._law = self._settings.make_law(self._context)
         self._behaviour = self._choice.make()
-        self._strengths = StrengthSchedule(self.layout)
+        self._strengths = strength_schedule(self.layout)
+        self._asked = behaviour_schedule()
         self._effective: EffectiveGains | None = None
         self._tracked = TrackedReference(
             self._character, self._own_reference, self.clock, episode_ns
@@ -204,6 +206,20 @@ class Controller:
         self._enter_episode(episode_ns)
         self._strengths.add(strengths)
 
+    def ask(self, asked: AskedBehaviour, *, episode_ns: int) -> None:
+        """Ask the behaviour for something from a stamp on, until the next time or episode's end.
+
+        Raises:
+            MotionError: it cannot be asked, or too many wait for their stamps.
+        """
+        if not self._choice.can_be_asked:
+            raise MotionError(
+                "behaviour: the parameter 'behaviour' is none that can be asked for others; it "
+                f"must be {' or '.join(ASKABLE)}"
+            )
+        self._enter_episode(episode_ns)
+        self._asked.add(asked)
+
     def compute_effort(
         self,
         state: StampedState,
@@ -266,11 +282,12 @@ class Controller:
             assisted=effective.assisted,
             opponent=around.opponent,
             course=self._tracked.course(tick),
+            asked=self._asked.at(stamp_ns),
         )
 
     def _effective_gains(self, stamp_ns: int) -> EffectiveGains:
         """The gains in force at a stamp, computed where settings or strengths change."""
-        strengths = self._strengths.at(stamp_ns)
+        strengths = self._strengths.at(stamp_ns).values
         if self._effective is None or self._effective.from_messages is not strengths:
             self._effective = effective_gains(self.layout, self._settings, strengths)
         return self._effective

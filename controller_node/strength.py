@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.schedule import Schedule
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import MotionError, one_of
-
-_MOST_WAITING = 100  # messages
 
 
 @dataclass(frozen=True)
@@ -56,27 +55,6 @@ def strengths_of(
     return Strengths(start_ns, values)
 
 
-class StrengthSchedule:
-    """Strengths of an episode: each holds from its stamp on, until the next one's."""
-
-    def __init__(self, layout: JointLayout) -> None:
-        self._in_force = Strengths(0, np.ones(len(layout.vector_starts)))
-        self._pending: list[Strengths] = []
-
-    def add(self, strengths: Strengths) -> None:
-        """Take strengths; of two of one stamp the later ones count.
-
-        Raises:
-            MotionError: too many wait for their stamps.
-        """
-        if len(self._pending) >= _MOST_WAITING:
-            raise MotionError(f"strength: more than {_MOST_WAITING} are yet to begin")
-        self._pending.append(strengths)
-        # The sort is stable: of one stamp the later strengths come last.
-        self._pending.sort(key=lambda strengths: strengths.start_ns)
-
-    def at(self, stamp_ns: int) -> FloatArray:
-        """The strengths (b,) at a stamp; stamps must not go back."""
-        while self._pending and self._pending[0].start_ns <= stamp_ns:
-            self._in_force = self._pending.pop(0)
-        return self._in_force.values
+def strength_schedule(layout: JointLayout) -> Schedule[Strengths]:
+    """The strengths of an episode, which begins with all of them at 1."""
+    return Schedule("strength", Strengths(0, np.ones(len(layout.vector_starts))))

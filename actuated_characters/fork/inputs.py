@@ -20,6 +20,7 @@ from actuated_characters.replay.world import (
     simulator_values,
     wrenches_of,
 )
+from actuated_characters.runs.planned.behaviours import PlannedBehaviour
 from actuated_characters.runs.planned.pins import PlannedPin, planned_pins
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
@@ -41,7 +42,13 @@ class Stop:
     pins: list[PlannedPin] = field(default_factory=list)
     throws: list[PlannedThrow] = field(default_factory=list)
     strengths: list[PlannedStrengths] = field(default_factory=list)
+    behaviours: list[PlannedBehaviour] = field(default_factory=list)
     resets: bool = False  # the state of the row begins an episode
+
+    @property
+    def asks_controller(self) -> bool:
+        """Whether something is sent that counts from an answer of the controller on."""
+        return bool(self.strengths or self.behaviours)
 
 
 Stops: TypeAlias = "defaultdict[int, Stop]"

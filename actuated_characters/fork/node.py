@@ -26,6 +26,7 @@ from actuated_characters.replay.comparison import (
 from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
 from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
+from actuated_characters.runs.planned.behaviours import read_behaviours
 from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.pins import read_pins
 from actuated_characters.runs.planned.strengths import read_strengths
@@ -46,6 +47,7 @@ from msgs_config.versions import describe_changes, installed_versions
 
 _LATEST = 2**62  # ns
 _STRENGTH = topics.STRENGTH.of(topics.CONTROLLER_NODE)
+_BEHAVIOUR = topics.BEHAVIOUR.of(topics.CONTROLLER_NODE)
 
 
 class ForkSettings(Settings):
@@ -64,10 +66,12 @@ class ForkSettings(Settings):
     throws: str = parameter("throws.json", "new throws, as a run writes them")
     pins: str = parameter("", "new pins, as a run writes them; empty: none")
     strengths: str = parameter("", "new strengths, as a run writes them; empty: none")
+    behaviours: str = parameter("", "new behaviours, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
     throw_subscribers: int = parameter(1, "likewise to throw")
     pin_subscribers: int = parameter(1, "likewise to pin")
     strength_subscribers: int = parameter(1, "likewise to controller_node/strength")
+    behaviour_subscribers: int = parameter(1, "likewise to controller_node/behaviour")
     session: GivenSession = GivenSession()
 
 
@@ -117,6 +121,8 @@ class ForkNode(Player):
         sent += [(topic, pushed) for topic in REQUESTS if topic.name in requested]
         if settings.strengths:
             sent.append((_STRENGTH, settings.strength_subscribers))
+        if settings.behaviours:
+            sent.append((_BEHAVIOUR, settings.behaviour_subscribers))
         self._outgoing: dict[str, tuple[Publisher, int]] = {
             topic.name: (self.node.publisher(topic), count) for topic, count in sent
         }
@@ -187,12 +193,13 @@ class ForkNode(Player):
     def _send(self, row: int) -> Turns:
         """Send the inputs of a stop."""
         stop = self._stops.get(row, Stop())
-        if row and (stop.settings or stop.strengths or self._requests.get(row)):
+        if row and (stop.settings or stop.asks_controller or self._requests.get(row)):
             yield from self._wait_for_answer(row - 1)
         for node, settings in stop.settings:
             yield from self._set(node, settings)
         messages: list[tuple[str, bytes]] = [*self._requests.get(row, ())]
         messages += [(_STRENGTH.name, each.encode()) for each in stop.strengths]
+        messages += [(_BEHAVIOUR.name, each.encode()) for each in stop.behaviours]
         for push in stop.pushes:
             content = replace(push.arrays(), frame_id=self._session)
             messages.append((topics.EXTERNAL_WRENCH.name, encode_wrenches(content)))
@@ -276,6 +283,8 @@ class ForkNode(Player):
 
         if settings.strengths:
             stops[row].strengths += read_strengths(Path(settings.strengths))
+        if settings.behaviours:
+            stops[row].behaviours += read_behaviours(Path(settings.behaviours))
         for push in read_pushes(Path(settings.file)):
             stop_of(push).pushes.append(push)
         for pin in read_pins(Path(settings.pins)) if settings.pins else ():

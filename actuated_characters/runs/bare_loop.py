@@ -6,10 +6,12 @@ import numpy as np
 
 from actuated_characters.metrics.run_metrics import Tick
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.behaviours import PlannedBehaviour
 from actuated_characters.runs.planned.pins import PlannedPin, pin_schedule
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.wrenches import PlannedPush, push_schedule
+from controller_node.behaviours.asked import asked_behaviour
 from controller_node.controller import Controller
 from controller_node.parameters import make_controller
 from controller_node.strength import strengths_of
@@ -30,8 +32,9 @@ def ticks_in_process(
     watch: Watch | None = None,
     strengths: Sequence[PlannedStrengths] = (),
     pins: Sequence[PlannedPin] = (),
+    behaviours: Sequence[PlannedBehaviour] = (),
 ) -> Iterator[Tick]:
-    """The ticks of a plan, one by one, with pushes, throws, strengths and pins.
+    """The ticks of a plan, one by one, with all that is sent beside.
 
     The states are those of a run over topics, bit for bit. To look at the controller as well, give
     a fresh one of the plan; to look at the simulation, a `watch`.
@@ -53,6 +56,8 @@ def ticks_in_process(
             names, values = tuple(each.strengths), tuple(each.strengths.values())
             taken = strengths_of(controller.layout, names, values, each.stamp_ns)
             controller.set_strengths(taken, episode_ns=episode_ns)
+        for asked in behaviours:
+            controller.ask(asked_behaviour((asked.ask,), asked.stamp_ns), episode_ns=episode_ns)
         drives_all = character.commanded.all()
         for _ in range(plan.ticks):
             state = character.state

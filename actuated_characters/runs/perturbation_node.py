@@ -1,9 +1,10 @@
-"""`pusher`: sends pushes, throws, velocities, strengths and pins, planned before a run."""
+"""`pusher`: sends pushes, throws, velocities, strengths, pins and behaviours, planned before."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from actuated_characters.runs.planned.behaviours import read_behaviours
 from actuated_characters.runs.planned.pins import read_pins
 from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.throws import read_throws
@@ -28,6 +29,7 @@ class PerturbationSettings(Settings):
     velocities: str = parameter("", "the velocities, as a run writes them; empty: none")
     strengths: str = parameter("", "the strengths, as a run writes them; empty: none")
     pins: str = parameter("", "the pins, as a run writes them; empty: none")
+    behaviours: str = parameter("", "the behaviours, as a run writes them; empty: none")
     wait_for_subscribers: int = parameter(
         1, "send when this many subscribe to external_wrench", maximum=1000
     )
@@ -35,6 +37,7 @@ class PerturbationSettings(Settings):
     velocity_subscribers: int = parameter(1, "likewise to cmd_vel_stamped", maximum=1000)
     strength_subscribers: int = parameter(1, "likewise to controller_node/strength", maximum=1000)
     pin_subscribers: int = parameter(1, "likewise to pin", maximum=1000)
+    behaviour_subscribers: int = parameter(1, "likewise to controller_node/behaviour", maximum=1000)
     session: GivenSession = GivenSession()
 
 
@@ -48,7 +51,7 @@ class PerturbationNode(ComposableNode):
     """
 
     def __init__(self, node: BusNode | None = None) -> None:
-        """Read the pushes, the throws, the velocities, the strengths and the pins.
+        """Read all that is to be sent.
 
         Without a place on a bus it is a node of ROS.
 
@@ -102,12 +105,17 @@ def _planned(
     def pins(file: Path) -> Iterator[bytes]:
         return (encode_pins(each.arrays(session)) for each in read_pins(file))
 
+    def behaviours(file: Path) -> Iterator[bytes]:
+        return (each.encode() for each in read_behaviours(file))
+
     strength = topics.STRENGTH.of(topics.CONTROLLER_NODE)
+    behaviour = topics.BEHAVIOUR.of(topics.CONTROLLER_NODE)
     yield topics.EXTERNAL_WRENCH, settings.file, settings.wait_for_subscribers, pushes
     yield topics.THROW, settings.throws, settings.throw_subscribers, throws
     yield topics.CMD_VEL_STAMPED, settings.velocities, settings.velocity_subscribers, velocities
     yield strength, settings.strengths, settings.strength_subscribers, strengths
     yield topics.PIN, settings.pins, settings.pin_subscribers, pins
+    yield behaviour, settings.behaviours, settings.behaviour_subscribers, behaviours
 
 
 class _PlannedPublisher:

@@ -43,17 +43,20 @@ def _write_planned(
     for what, planned in by_name.items():
         write_planned(files[what], planned)
     steers, weakens, holds = bool(inputs.velocities), bool(inputs.strengths), bool(inputs.pins)
+    asks = bool(inputs.behaviours)
     return {
         "file": str(files["pushes"]),
         "throws": str(files["throws"]),
         **({"velocities": str(files["velocities"])} if steers else {}),
         **({"strengths": str(files["strengths"])} if weakens else {}),
         **({"pins": str(files["pins"])} if holds else {}),
+        **({"behaviours": str(files["behaviours"])} if asks else {}),
         "wait_for_subscribers": subscribers("external_wrench"),
         "throw_subscribers": subscribers("throw"),
         "pin_subscribers": subscribers("pin"),
         **({"velocity_subscribers": subscribers("cmd_vel_stamped")} if steers else {}),
         **({"strength_subscribers": subscribers("controller_node/strength")} if weakens else {}),
+        **({"behaviour_subscribers": subscribers("controller_node/behaviour")} if asks else {}),
     }
 
 

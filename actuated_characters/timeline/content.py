@@ -18,7 +18,10 @@ Content: TypeAlias = Mapping[str, Any]
 """A whole timeline; nobody changes one, an edit makes another."""
 
 KEYS = "keys"
-TRACKS = (*("clips", "steering", "reach", "look", "limp", "strengths", "pushes", "pins", "throws"),)
+TRACKS = (
+    *("clips", "steering", "reach", "look", "limp", "strengths", "behaviours"),
+    *("pushes", "pins", "throws"),
+)
 """The lists of events."""
 TOP_LEVEL = ("character", "duration", "run", "set", KEYS, *TRACKS)
 

@@ -11,11 +11,13 @@ from actuated_characters.fork.plan import ForkInputs, ForkPlan, plan_fork
 from actuated_characters.recorder.run_directory import PARAMETERS, prepare_directory
 from actuated_characters.runs.in_process import run_in_process
 from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.behaviours import PlannedBehaviour, read_behaviours
 from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.strengths import PlannedStrengths, read_strengths
 from actuated_characters.runs.planned.timeline import TimelineRun, plan_timeline
 from actuated_characters.timeline.takes import Take, Takes, write_copy
+from controller_node.behaviours.asked import UNASKED
 from controller_node.planner.settings import (
     NO_PLANNER,
     PlannerParameters,
@@ -203,27 +205,43 @@ def _fork(line: Sequence[Take], first: int, run: TimelineRun) -> ForkPlan:
     inputs = PlannedInputs(
         later(run.inputs.pushes),
         later(run.inputs.throws),
-        strengths=later(_overriding(line, run.inputs.strengths)),
+        strengths=later(
+            _overriding(
+                _sent(line, "strengths", read_strengths),
+                run.inputs.strengths,
+                PlannedStrengths(0, {}),
+            )
+        ),
         pins=later(run.inputs.pins),
+        behaviours=later(
+            _overriding(
+                _sent(line, "behaviours", read_behaviours),
+                run.inputs.behaviours,
+                PlannedBehaviour(0, UNASKED.ask.value),
+            )
+        ),
     )
     return replace(fork, inputs=inputs)
 
 
-def _overriding(line: Sequence[Take], wanted: Sequence[PlannedStrengths]) -> list[PlannedStrengths]:
-    """Strengths that count in place of all that a line of takes was sent.
+def _sent(
+    line: Sequence[Take], kind: str, read: Callable[[Path], Sequence[_Planned]]
+) -> list[_Planned]:
+    """What the controllers of a line of takes were sent of a kind."""
+    files = [take.directory / PARAMETERS / f"{kind}.json" for take in line]
+    return [each for file in files if file.is_file() for each in read(file)]
 
-    A controller has those that wait for their stamps in its keyframes. Of two of one stamp the
-    later ones count; so each of those stamps gets what is wanted then.
+
+def _overriding(
+    sent: Sequence[_Planned], wanted: Sequence[_Planned], first: _Planned
+) -> list[_Planned]:
+    """What counts in place of all that was sent; `first` holds until something is wanted.
+
+    A controller has what waits for its stamp in its keyframes. Of two of one stamp the later one
+    counts; so each of those stamps gets what is wanted then.
     """
-    sent = [
-        each.stamp_ns
-        for take in line
-        for file in [take.directory / PARAMETERS / "strengths.json"]
-        if file.is_file()
-        for each in read_strengths(file)
-    ]
     overriding = []
-    for stamp_ns in sorted({*sent, *(each.stamp_ns for each in wanted)}):
-        in_force = [each.strengths for each in wanted if each.stamp_ns <= stamp_ns]
-        overriding.append(PlannedStrengths(stamp_ns, in_force[-1] if in_force else {}))
+    for stamp_ns in sorted({each.stamp_ns for each in (*sent, *wanted)}):
+        in_force = [first, *(each for each in wanted if each.stamp_ns <= stamp_ns)]
+        overriding.append(replace(in_force[-1], stamp_ns=stamp_ns))
     return overriding

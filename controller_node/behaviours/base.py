@@ -6,6 +6,7 @@ from enum import Enum
 from functools import partial
 from typing import NamedTuple, Protocol, TypeAlias
 
+from controller_node.behaviours.asked import UNASKED, AskedBehaviour
 from controller_node.behaviours.targets import Target
 from controller_node.control_laws import GainArrays
 from controller_node.references.base import ReferenceState
@@ -52,6 +53,7 @@ class Observation(NamedTuple):
     assisted: bool  # whether the gains in force drive a floating base
     opponent: FloatArray | None = None  # (3,) m, world: the root of the opponent, if it has one
     course: Course | None = None  # what a steered reference is told
+    asked: AskedBehaviour = UNASKED  # the same one as long as nothing else is asked for
 
     def assistance(self, unless_none: object = "full") -> object:
         """The assistance for a report: "none" where the gains drive no floating base."""
@@ -123,6 +125,7 @@ class BehaviourChoice:
     needs_contacts: bool = False
     opponent: str = ""  # the character whose place it needs, if it needs one
     makes_effort: bool = False  # it takes the place of a law and of a trajectory's targets
+    can_be_asked: bool = False  # whether `~/behaviour` says what of it is wanted
 
     def check(self, around: Surroundings) -> None:
         """Raise ConfigurationError if what it needs with each state is not there."""

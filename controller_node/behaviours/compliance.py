@@ -1,9 +1,11 @@
 """The gains of a character that was hit: soft near the struck link, and by inertia."""
 
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 
+from controller_node.behaviours.asked import Ask
 from controller_node.behaviours.base import Observation
 from controller_node.behaviours.settings import ReactionSettings
 from controller_node.control_laws import GainArrays, scale_gains, scale_limits
@@ -76,6 +78,8 @@ class ReactionGains:
         self._character, self._settings = character, settings
         self._root_force = settings.assistance * weight
         self._plans = plans
+        layout = character.layout
+        self._driven = layout.mask(layout.actuated_joint_names)
 
     def give_way(self, struck: int, mass_diagonal: FloatArray) -> None:
         """Be soft near a struck link, an index of `Character.links`, in the present pose."""
@@ -83,12 +87,22 @@ class ReactionGains:
         self._softness = softened(self._character, struck, self._settings.softness)
 
     def firm(self, seen: Observation, elapsed: float) -> GainArrays:
-        """The gains in force; of an active ragdoll the root's torque is bounded."""
+        """The gains in force, braced if asked; an active ragdoll's root torque is bounded."""
+        gains = self._braced(seen.gains) if seen.asked.ask is Ask.BRACE else seen.gains
         if self._settings.searches:
-            return seen.gains
-        limits = seen.gains.effort_limits.copy()
+            return gains
+        limits = gains.effort_limits.copy()
         limits[1] = min(limits[1], self._settings.upright_torque)
-        return replace(seen.gains, effort_limits=limits)
+        return replace(gains, effort_limits=limits)
+
+    def _braced(self, gains: GainArrays) -> GainArrays:
+        """Stiffer joints with the same damping ratio; the root's gains and all limits stay."""
+        times = self._settings.brace_stiffness
+        return replace(
+            gains,
+            stiffness=np.where(self._driven, times, 1.0) * gains.stiffness,
+            damping=np.where(self._driven, sqrt(times), 1.0) * gains.damping,
+        )
 
     def soft(self, seen: Observation, elapsed: float) -> GainArrays:
         """Soft near the struck link, with a bounded force on the root."""

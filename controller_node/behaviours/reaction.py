@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.behaviours.asked import UNASKED, Ask
 from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
 from controller_node.behaviours.compliance import ReactionGains
 from controller_node.behaviours.hit_detection import WINDOW, Hit, HitDetector
@@ -67,6 +68,7 @@ class Reaction:
         self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
         self._target: Target = self._own
+        self._asked = UNASKED
         self._hit = Hit(0, 0.0)  # the hit that was reacted to last
         self._begin(0.0, Mode.TRACK, self._begin_tracking, self._phase_gains.firm)
 
@@ -85,8 +87,22 @@ class Reaction:
         hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
         still = np.zeros(self._layout.size)
         self._body = ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
-        self._step(seen, hit)
+        if not self._gets_up_now(seen):
+            self._step(seen, hit)
         return BehaviourOutput(self._phase, self._target, self._gains(seen, self._elapsed(seen)))
+
+    def _gets_up_now(self, seen: Observation) -> bool:
+        """Begin to get up where that was asked for in this tick, and it lies."""
+        is_new, self._asked = seen.asked != self._asked, seen.asked
+        if not is_new or seen.asked.ask is not Ask.GET_UP:
+            return False
+        if self._phase.mode is Mode.TRACK and self._has_fallen(seen):
+            self._go_limp(seen, "asked", None)
+        if not isinstance(self._target, CurrentStateTarget):
+            return False
+        self._target.state = self._body
+        self._prepare_get_up(seen)
+        return True
 
     def _begin(
         self,
@@ -117,7 +133,11 @@ class Reaction:
         self._track(seen, hit)
 
     def _track(self, seen: Observation, hit: Hit | None) -> None:
-        """Give way to a hit, or go limp by a hard one or having fallen."""
+        """Give way to a hit, or go limp by a hard one or having fallen, as it is asked to."""
+        if seen.asked.ask in (Ask.TRACK, Ask.BRACE):
+            return
+        if seen.asked.ask is Ask.GET_UP:
+            hit = None
         if hit is not None and hit.impulse >= self._settings.limp_threshold:
             self._go_limp(seen, "hit", hit)
         elif (
@@ -171,8 +191,11 @@ class Reaction:
             self._moved = seen.time
         still = seen.time - self._moved >= _STILL_TIME
         if still or self._elapsed(seen) >= _LONGEST_LIMP:
-            facts = {"side": "faceup" if self._faces_up() else "facedown", "assistance": "none"}
-            self._begin(seen.time, Mode.SEARCH, self._find_get_up, self._phase_gains.limp, **facts)
+            self._prepare_get_up(seen)
+
+    def _prepare_get_up(self, seen: Observation) -> None:
+        facts = {"side": "faceup" if self._faces_up() else "facedown", "assistance": "none"}
+        self._begin(seen.time, Mode.SEARCH, self._find_get_up, self._phase_gains.limp, **facts)
 
     def _find_get_up(self, seen: Observation, hit: Hit | None) -> None:
         assert isinstance(self._target, CurrentStateTarget)
@@ -193,7 +216,8 @@ class Reaction:
         self._begin(seen.time, Mode.BLEND, self._rise, self._phase_gains.rising, **facts)
 
     def _rise(self, seen: Observation, hit: Hit | None) -> None:
-        if hit is not None and hit.impulse >= self._settings.limp_threshold:
+        is_hard = hit is not None and hit.impulse >= self._settings.limp_threshold
+        if is_hard and seen.asked.ask is Ask.REACT:
             self._go_limp(seen, "hit", hit)
         elif seen.time >= self._rise_until:
             if isinstance(self._target, ClipTarget):

@@ -23,13 +23,13 @@ LYING_PART = 0.5
 @BEHAVIOURS.register("active_ragdoll", ReactionSettings)
 def _active_ragdoll(character: Character, values: Values) -> BehaviourChoice:
     kit = _make_kit(character, values)
-    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True)
+    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True, can_be_asked=True)
 
 
 @BEHAVIOURS.register("reactive")
 def _reactive(character: Character, values: Values) -> BehaviourChoice:
     kit = _make_kit(character, values, searches=True)
-    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True)
+    return BehaviourChoice(partial(Reaction, kit), needs_contacts=True, can_be_asked=True)
 
 
 @BEHAVIOURS.register("pursuit", PursuitSettings)

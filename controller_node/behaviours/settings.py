@@ -58,6 +58,14 @@ class ReactionSettings(Settings):
         name="upright.torque",
         unit="N m",
     )
+    brace_stiffness: float = parameter(
+        4.0,
+        "how many times as stiff the joints are that are asked to brace; as much damping as keeps "
+        "its ratio",
+        name="brace.stiffness",
+        minimum=1.0,
+        maximum=100.0,
+    )
     recovery: str = parameter(
         "clip",
         "get up by a get-up clip, or straight back into the reference",

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controller_node.actuation import net_wrench
+from controller_node.behaviours.asked import AskedBehaviour
 from controller_node.behaviours.base import ModeReport
 from controller_node.interface.plan_message import plan_message
 from controller_node.planner.outlook import Outlook
@@ -63,6 +64,7 @@ class ControllerPublishers:
         self._trajectories = node.publisher(topics.ACTIVE_TRAJECTORY)
         self._velocities = node.publisher(topics.ACTIVE_CMD_VEL)
         self._strengths = node.publisher(topics.ACTIVE_STRENGTH)
+        self._behaviours = node.publisher(topics.ACTIVE_BEHAVIOUR)
         self._modes = node.publisher(topics.MODE)
         self._plans = node.publisher(topics.PLAN)
         self._published_mode: ModeReport | None = None
@@ -154,6 +156,11 @@ class ControllerPublishers:
         encoder = JointStateEncoder(list(values), "")
         effort = np.array(list(values.values()))
         self._strengths.publish(encoder.encode(strengths.start_ns, effort=effort))
+
+    def publish_behaviour(self, asked: AskedBehaviour) -> None:
+        """Publish what was asked of the behaviour, with the stamp that it begins at."""
+        encoder = JointStateEncoder([asked.ask.value], "")
+        self._behaviours.publish(encoder.encode(asked.start_ns))
 
     def begin_episode(self) -> None:
         """Publish the next mode even where it is the one of before."""

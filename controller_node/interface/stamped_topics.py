@@ -1,8 +1,9 @@
-"""Trajectories, velocities and strengths that come over topics, and count from their stamps on."""
+"""What a controller is asked for over topics, each message of which counts from its stamp on."""
 
 from functools import partial
 from typing import Any
 
+from controller_node.behaviours.asked import asked_behaviour
 from controller_node.controller import Controller
 from controller_node.interface.publishers import ControllerPublishers
 from controller_node.interface.stamped_message import decode_stamped
@@ -19,8 +20,9 @@ from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 class StampedTopics:
     """Subscribes to what a controller is asked for, and publishes what was accepted.
 
-    That is `~/joint_trajectory` and `~/strength`; where the reference is steered, `cmd_vel` and
-    `cmd_vel_stamped` as well. They are two topics: no node can subscribe to two types on one.
+    That is `~/joint_trajectory`, `~/strength` and `~/behaviour`; where the reference is steered,
+    `cmd_vel` and `cmd_vel_stamped` as well. They are two topics: no node can subscribe to two types
+    on one.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class StampedTopics:
         self._trajectories = self._subscribe(topics.JOINT_TRAJECTORY, use=self._set_trajectory)
         self._velocities: list[StampedSubscription] = []
         self._strengths = self._subscribe(topics.STRENGTH, use=self._set_strengths)
+        self._behaviours = self._subscribe(topics.BEHAVIOUR, use=self._ask)
         self._now_ns = self._episode_ns = 0
         self.use(controller, None)
 
@@ -62,6 +65,7 @@ class StampedTopics:
             "refused_trajectories": self._trajectories.rejected,
             **{f"refused_{each.topic}": each.rejected for each in self._velocities},
             "refused_strengths": self._strengths.rejected,
+            "refused_behaviours": self._behaviours.rejected,
         }
 
     def take(self, state_ns: int, episode_ns: int) -> None:
@@ -76,6 +80,7 @@ class StampedTopics:
             for each in self._velocities:
                 each.take()
         self._strengths.take()
+        self._behaviours.take()
 
     def _set_trajectory(self, raw: bytes) -> None:
         message, start_ns = decode_stamped(raw, typed.JOINT_TRAJECTORY, "trajectory", self._now_ns)
@@ -130,6 +135,15 @@ class StampedTopics:
         strengths = strengths_of(layout, tuple(message.name), tuple(message.effort), start_ns)
         self._controller.set_strengths(strengths, episode_ns=self._episode_ns)
         self._outputs.publish_strengths(strengths)
+
+    def _ask(self, raw: bytes) -> None:
+        message, start_ns = decode_stamped(raw, JOINT_STATE, "behaviour", self._now_ns)
+        clock = self._controller.clock
+        asked = asked_behaviour(
+            tuple(message.name), clock.stamp_ns(clock.first_tick_from(start_ns))
+        )
+        self._controller.ask(asked, episode_ns=self._episode_ns)
+        self._outputs.publish_behaviour(asked)
 
 
 def _listed(velocity: tuple[float, float, float]) -> str:

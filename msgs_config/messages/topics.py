@@ -363,6 +363,29 @@ ACTIVE_STRENGTH = Topic(
     nodes=(CONTROLLER_NODE,),
     content="latched: the last accepted strengths, of all joints, stamped with their first tick",
 )
+BEHAVIOUR = Topic(
+    "~/behaviour",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "any node → controller_node",
+    nodes=(CONTROLLER_NODE,),
+    accepted_on="~/active_behaviour",
+    content=(
+        "with `behaviour: active_ragdoll` or `reactive`: what of it is wanted, as the only "
+        "`name`: `react`, as without any message; `get_up`, without reacting to hits, and at once "
+        "if it lies; `track`; or `brace`, to track with joints `brace.stiffness` times as stiff. "
+        "It holds from the stamp on, with stamp 0 from the next answered state on, until the next "
+        "message or the episode's end"
+    ),
+)
+ACTIVE_BEHAVIOUR = Topic(
+    "~/active_behaviour",
+    "sensor_msgs/msg/JointState",
+    CHANGES,
+    "controller_node → all",
+    nodes=(CONTROLLER_NODE,),
+    content="latched: the last accepted message on `~/behaviour`, stamped with its first tick",
+)
 MODE = Topic(
     "~/mode",
     "std_msgs/msg/String",

@@ -7,7 +7,7 @@ import pytest
 
 from controller_node.control_laws import scale_gains
 from controller_node.controller import Controller
-from controller_node.strength import Strengths, StrengthSchedule, strengths_of
+from controller_node.strength import Strengths, strength_schedule, strengths_of
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ActuatedCharactersError, MotionError
 from msgs_config.messages.clock import TickClock
@@ -140,7 +140,7 @@ def test_the_root_has_no_strength() -> None:
 
 
 def test_too_many_that_wait_are_refused() -> None:
-    schedule = StrengthSchedule(LAYOUT)
+    schedule = strength_schedule(LAYOUT)
     for number in range(100):
         schedule.add(of(number, chest=0.5))
 

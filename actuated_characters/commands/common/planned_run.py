@@ -100,6 +100,7 @@ def _run_of_timeline(
         [*run.inputs.throws, *throws],
         strengths=run.inputs.strengths,
         pins=run.inputs.pins,
+        behaviours=run.inputs.behaviours,
     )
     return PlannedRun(run.plan, inputs, [*run.warnings, *in_the_way])
 

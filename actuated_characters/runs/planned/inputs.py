@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from actuated_characters.runs.planned.behaviours import PlannedBehaviour
 from actuated_characters.runs.planned.files import Planned
 from actuated_characters.runs.planned.pins import PlannedPin
 from actuated_characters.runs.planned.strengths import PlannedStrengths
@@ -20,6 +21,7 @@ class PlannedInputs:
     velocities: Sequence[PlannedVelocity] = ()
     strengths: Sequence[PlannedStrengths] = ()
     pins: Sequence[PlannedPin] = ()
+    behaviours: Sequence[PlannedBehaviour] = ()
 
     def by_name(self) -> Mapping[str, Sequence[Planned]]:
         """Each kind by its name."""

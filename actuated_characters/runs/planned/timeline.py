@@ -6,14 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuated_characters.runs.plan import SHARED, RunPlan, count_ticks, make_plan
+from actuated_characters.runs.planned.behaviours import PlannedBehaviour
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.pins import PlannedPin
 from actuated_characters.runs.planned.strengths import PlannedStrengths
 from actuated_characters.runs.planned.throw_requests import parse_throw
 from actuated_characters.runs.planned.throws import PlannedThrow, plan_throw
 from actuated_characters.runs.planned.wrenches import PlannedPush, plan_push
+from controller_node.behaviours.asked import ASKABLE, Ask
 from controller_node.planner.settings import NO_PLANNER, PREDICTIVE
 from controller_node.references.timeline.description import (
+    BehaviourEntry,
     Entry,
     PinEntry,
     Point,
@@ -72,13 +75,13 @@ def plan_timeline(
     timeline, own, other = read_timeline(name), dict(simulator), dict(controller)
     whose = character or timeline.character
     loaded = load_character(whose, collides(own | other))
-    _set_parameters(timeline, loaded, own, other)
+    between = _set_parameters(timeline, loaded, own, other)
     duration = timeline.duration if duration is None else duration
     reference = {"reference": "timeline", "timeline": name}
     plan = make_plan(whose, duration or _AFTERWARDS, reference, own, other, loaded=loaded)
     if duration is None:
         plan = plan.lasting(count_ticks(_default_duration(plan), plan.simulation.rate_hz))
-    return _with_events(plan, timeline)
+    return _with_events(plan, timeline, between)
 
 
 def _set_parameters(
@@ -86,10 +89,12 @@ def _set_parameters(
     character: Character,
     simulator: dict[str, object],
     controller: dict[str, object],
-) -> None:
+) -> Ask:
     """Set what a timeline says of the nodes' parameters, unless it is set.
 
-    One that says no planner has `predictive` for a character that stands by itself.
+    One that says no planner has `predictive` for a character that stands by itself. Returns what is
+    asked for between the behaviours of its track: all that the run's behaviour does, where one is
+    said; else to track.
     """
     run = dict(timeline.run)
     if not character.layout.has_floating_base or not character.feet:
@@ -102,6 +107,10 @@ def _set_parameters(
         (controller, {**run, **own.get("controller_node", {})}),
     ):
         given.update({name: brought[name] for name in brought if name not in (*given, *taken)})
+    if not timeline.behaviours or "behaviour" in controller:
+        return Ask.REACT
+    controller["behaviour"] = ASKABLE[0]
+    return Ask.TRACK
 
 
 def _default_duration(plan: RunPlan) -> float:
@@ -113,11 +122,12 @@ def _default_duration(plan: RunPlan) -> float:
     over += [each.until for each in timeline.pins]
     over += [each.at + (each.duration or 0.0) for each in timeline.pushes]
     over += [each.at for each in timeline.throws]
+    over += [each.at if each.until is None else each.until for each in timeline.behaviours]
     return max(over) + _AFTERWARDS
 
 
-def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
-    """The run of a plan, with the events of its timeline."""
+def _with_events(plan: RunPlan, timeline: Timeline, between: Ask) -> TimelineRun:
+    """The run of a plan, with the events of its timeline; `between` as of `_set_parameters`."""
     warnings = list(plan.warnings)
     pushes = [push for entry in timeline.pushes for push in _pushes(plan, entry)]
     throws: list[PlannedThrow] = []
@@ -131,7 +141,8 @@ def _with_events(plan: RunPlan, timeline: Timeline) -> TimelineRun:
         warnings += [f"{entry.place}: {line}" for line in in_the_way]
     strengths = _strengths(plan, timeline.strengths)
     pins = _pins(plan, timeline.pins)
-    inputs = PlannedInputs(pushes, throws, strengths=strengths, pins=pins)
+    behaviours = _behaviours(plan, timeline.behaviours, between)
+    inputs = PlannedInputs(pushes, throws, strengths=strengths, pins=pins, behaviours=behaviours)
     return TimelineRun(plan, inputs, warnings)
 
 
@@ -221,6 +232,35 @@ def _strengths(plan: RunPlan, entries: Sequence[StrengthEntry]) -> list[PlannedS
         if tick < plan.ticks:
             planned.append(PlannedStrengths(clock.stamp_ns(1 + tick), values))
     return planned
+
+
+def _behaviours(
+    plan: RunPlan, entries: Sequence[BehaviourEntry], between: Ask
+) -> list[PlannedBehaviour]:
+    """What the behaviour is asked for at each time at which that changes."""
+    rate, known = plan.simulation.rate_hz, [each.value for each in Ask]
+    behaviour = str(plan.controller["behaviour"])
+    asked: dict[int, str] = {}  # by tick
+    if entries and between is not Ask.REACT:
+        asked[0] = between.value
+    for entry in entries:
+        _check_within(plan, entry)
+        if entry.ask not in known:
+            raise MotionError(f"{entry.place}: {one_of('do:', entry.ask, known)}")
+        if behaviour not in ASKABLE:
+            raise MotionError(
+                f"{entry.place}: the run's behaviour is {behaviour}, which cannot be asked for "
+                f"others; it must be {' or '.join(ASKABLE)}"
+            )
+        asked[round(entry.at * rate)] = entry.ask  # in place of the end of the one before
+        if entry.until is not None:
+            asked[round(entry.until * rate)] = between.value
+    clock = TickClock(rate)
+    return [
+        PlannedBehaviour(clock.stamp_ns(1 + tick), ask)
+        for tick, ask in asked.items()
+        if tick < plan.ticks
+    ]
 
 
 def _check_within(plan: RunPlan, entry: Entry) -> None:

@@ -51,6 +51,10 @@ FORMS: dict[str, tuple[Field, ...]] = {
         Field("joints", NAMES, "right_shoulder", "names, with commas between"),
         Field("strength", NUMBER, 0.3, "0 to 1"),
     ),
+    "behaviours": (
+        _UNTIL,
+        Field("do", TEXT, "react", "track, react, get_up or brace"),
+    ),
     "pushes": (
         Field("link", LINK, "chest", "what is pushed"),
         Field("force", VECTOR, "0, 200, 0", "N, world"),

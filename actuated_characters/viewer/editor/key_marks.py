@@ -17,6 +17,7 @@ _COLORS = {
     "look": "#8c6d31",
     "limp": "#7f7f7f",
     "strengths": "#9467bd",
+    "behaviours": "#bcbd22",
     "pins": "#d62728",
 }
 

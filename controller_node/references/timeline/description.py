@@ -83,6 +83,14 @@ class StrengthEntry(Entry):
 
 
 @dataclass(frozen=True)
+class BehaviourEntry(Entry):
+    """What the behaviour is asked for."""
+
+    until: float | None  # s; None: until the next one begins, or the end
+    ask: str
+
+
+@dataclass(frozen=True)
 class PushEntry(Entry):
     """A force on a link's centre of mass."""
 
@@ -126,3 +134,4 @@ class Timeline:
     pushes: tuple[PushEntry, ...]
     pins: tuple[PinEntry, ...]
     throws: tuple[ThrowEntry, ...]
+    behaviours: tuple[BehaviourEntry, ...]

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from controller_node.references.limits import LARGEST_NUMBER
 from controller_node.references.timeline.description import (
+    BehaviourEntry,
     ClipEntry,
     Ease,
     Entry,
@@ -39,6 +40,7 @@ _PIN_FORCES = (1e-3, 1e6)  # N, least and most
 _BOUNDS = (-LARGEST_NUMBER, LARGEST_NUMBER)
 _T = TypeVar("_T")
 _TimedEntry = TypeVar("_TimedEntry", bound=Entry)
+_LastingEntry = TypeVar("_LastingEntry", SteeringEntry, BehaviourEntry)
 
 
 def shipped_timelines() -> list[str]:
@@ -73,7 +75,7 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
     reader = MappingReader(file, content, MotionError)
     tracks = (
         *("keys", "clips", "steering", "reach", "look", "limp", "strengths"),
-        *("pushes", "pins", "throws"),
+        *("pushes", "pins", "throws", "behaviours"),
     )
     reader.check_keys(("character", "duration", "run", "set", *tracks))
     has_duration = content.get("duration") is not None
@@ -88,13 +90,16 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
         settings=_settings(reader),
         layers=_track(file, content, "keys", _layer, ("name", "in", "out", "poses")),
         clips=_in_order(_track(file, content, "clips", _clip, _CLIP_KEYS)),
-        steering=_apart(_track(file, content, "steering", _steering, _STEERING_KEYS)),
+        steering=_apart(_track(file, content, "steering", _steering, _STEERING_KEYS), "velocity"),
         reaches=_track(file, content, "reach", _target, target),
         looks=_track(file, content, "look", _target, target),
         strengths=(*limp, *strengths),
         pushes=_track(file, content, "pushes", _push, ("at", "link", "force", "for")),
         pins=_track(file, content, "pins", _pin, ("at", "until", "link", "point", "force")),
         throws=_track(file, content, "throws", _throw, _THROW_KEYS),
+        behaviours=_apart(
+            _track(file, content, "behaviours", _behaviour, ("at", "until", "do")), "behaviour"
+        ),
     )
 
 
@@ -223,6 +228,12 @@ def _throw(reader: MappingReader, place: str) -> ThrowEntry:
     return ThrowEntry(place, _time(reader), reader.content)
 
 
+def _behaviour(reader: MappingReader, place: str) -> BehaviourEntry:
+    at = _time(reader)
+    until = _later(reader, "until", at) if "until" in reader.content else None
+    return BehaviourEntry(place, at, until, reader.text("do"))
+
+
 def _time(reader: MappingReader, key: str = "at", least: float = 0.0) -> float:
     return reader.number(key, None, least, LARGEST_NUMBER)
 
@@ -253,14 +264,14 @@ def _in_order(entries: Iterable[_TimedEntry]) -> tuple[_TimedEntry, ...]:
     return ordered
 
 
-def _apart(entries: Iterable[SteeringEntry]) -> tuple[SteeringEntry, ...]:
-    """Velocities by their times, each over before the next one begins."""
+def _apart(entries: Iterable[_LastingEntry], what: str) -> tuple[_LastingEntry, ...]:
+    """Entries by their times, each over before the next one begins; `what` is their name."""
     ordered = _in_order(entries)
     for before, after in pairwise(ordered):
-        if after.at < before.until:
+        if before.until is not None and after.at < before.until:
             raise MotionError(
                 f"{after.place}: at is {after.at:g}; it must be {before.until:g} s or later, when "
-                "the velocity before is over"
+                f"the {what} before is over"
             )
     return ordered
 

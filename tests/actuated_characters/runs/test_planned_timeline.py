@@ -13,7 +13,9 @@ from actuated_characters.cli import main
 from actuated_characters.commands.common.planned_run import PlannedRun, planned_run
 from actuated_characters.commands.run import add_run
 from actuated_characters.replay.replay import replay
+from actuated_characters.replay.through_topics import replay_commands
 from actuated_characters.runs.bare_loop import ticks_in_process
+from actuated_characters.runs.planned.behaviours import read_behaviours
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.timeline import plan_timeline
@@ -35,7 +37,11 @@ EVENTFUL: dict[str, Any] = {
     "clips": [{"at": 0.0, "clip": "walk"}],
     "strengths": [{"at": 0.2, "until": 0.6, "joints": ["left_elbow", "neck"], "strength": 0.3}],
     "pushes": [{"at": 0.5, "link": "chest", "force": [40, 0, 0], "for": 0.2}],
-    "throws": [{"at": 0.6, "mass": 1, "speed": 8, "target": "chest"}],
+    "throws": [
+        {"at": 0.6, "mass": 1, "speed": 8, "target": "chest"},
+        {"at": 0.7, "mass": 9, "speed": 3, "target": "left_ankle", "shape": "box", "slide": True},
+    ],
+    "behaviours": [{"at": 0.3, "until": 0.55, "do": "brace"}, {"at": 0.6, "do": "react"}],
 }
 
 
@@ -76,8 +82,16 @@ def test_over_topics_in_one_process_and_from_its_bag_a_run_has_one_hash(tmp_path
 
     assert summary_of(alone)["state_hash"] == summary_of(sent)["state_hash"]
     assert replay([read_recording(sent)]).identical
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("ROS_DOMAIN_ID", raising=False)
+        again = replay_commands(sent, progress=lambda _: None, tell=lambda _: None)
+    assert again.identical and again.states == RATE + 1
     *_, last = ticks_in_process(
-        run.plan, run.inputs.pushes, run.inputs.throws, strengths=run.inputs.strengths
+        run.plan,
+        run.inputs.pushes,
+        run.inputs.throws,
+        strengths=run.inputs.strengths,
+        behaviours=run.inputs.behaviours,
     )
     ends = read_recording(sent).position[-1]
     np.testing.assert_array_equal(last.following.position, ends)
@@ -150,13 +164,37 @@ def test_strengths_that_overlap_multiply_and_are_written_and_read(tmp_path: Path
     assert read_strengths(tmp_path / "strengths.json") == list(run.inputs.strengths)
 
 
+def test_between_behaviours_it_does_what_the_run_says_or_tracks(tmp_path: Path) -> None:
+    def asked(content: dict[str, Any], *options: str) -> tuple[object, list[tuple[int, str]]]:
+        run = planned(tmp_path, {"behaviours": behaviours, **content}, *options)
+        sent = [(each.stamp_ns, each.ask) for each in run.inputs.behaviours]
+        write_planned(tmp_path / "behaviours.json", run.inputs.behaviours)
+        assert read_behaviours(tmp_path / "behaviours.json") == list(run.inputs.behaviours)
+        return run.plan.controller["behaviour"], sent
+
+    behaviours = [
+        {"at": 3.0, "do": "get_up"},
+        {"at": 1.0, "until": 2.0, "do": "react"},
+        {"at": 2.0, "until": 2.5, "do": "brace"},
+    ]
+    times = [(tick(1.0), "react"), (tick(2.0), "brace"), (tick(3.0), "get_up")]
+    last = times.pop()
+
+    tracks = [(tick(0.0), "track"), *times, (tick(2.5), "track"), last]
+    assert asked({"run": ASSISTED}) == ("active_ragdoll", tracks)
+    reacts = [*times, (tick(2.5), "react"), last]
+    assert asked({"run": {**ASSISTED, "behaviour": "reactive"}}) == ("reactive", reacts)
+    assert asked({"run": ASSISTED}, "--behaviour", "reactive") == ("reactive", reacts)
+    assert planned(tmp_path, {"behaviours": behaviours}).plan.ticks == 4 * RATE
+
+
 def test_pushes_and_balls_of_the_options_come_besides(tmp_path: Path) -> None:
     throw = "mass=1 speed=8 at=0.7 target=neck"
 
     run = planned(tmp_path, EVENTFUL, "--push", "chest:1,0,0@0.1", "--throw", throw)
 
     assert [each.stamp_ns for each in run.inputs.pushes] == [tick(0.5), tick(0.6), tick(0.1)]
-    assert len(run.inputs.throws) == 2
+    assert len(run.inputs.throws) == 3
 
 
 def test_what_is_limp_has_no_effort_until_it_is_over(tmp_path: Path) -> None:
@@ -198,6 +236,7 @@ def test_a_shipped_timeline_comes_to_its_end_by_joint_torques_alone(name: str, s
             run.inputs.throws,
             strengths=run.inputs.strengths,
             pins=run.inputs.pins,
+            behaviours=run.inputs.behaviours,
         )
     )
 
@@ -225,6 +264,19 @@ def test_a_shipped_timeline_comes_to_its_end_by_joint_torques_alone(name: str, s
         (
             {"strengths": [{"at": 0, "until": 1, "joints": ["ear"], "strength": 1}]},
             "strengths 1: .*'ear'",
+        ),
+        ({"behaviours": [{"at": 0, "do": "brase"}]}, "behaviours 1: .*'brase'.*brace"),
+        ({"behaviours": [{"at": 5, "do": "brace"}]}, "behaviours 1: at is 5 s; the run ends"),
+        (
+            {
+                "behaviours": [{"at": 0, "do": "react"}],
+                "run": {**ASSISTED, "behaviour": "tracking"},
+            },
+            "behaviours 1: the run's behaviour is tracking.* must be active_ragdoll or reactive",
+        ),
+        (
+            {"behaviours": [{"at": 0, "until": 0.5, "do": "react"}, {"at": 0.3, "do": "brace"}]},
+            "behaviours 2: at is 0.3; it must be 0.5 s or later",
         ),
         ({"limp": [{"at": 5, "until": 6}]}, "limp 1: at is 5 s; the run ends at 1 s"),
         ({"set": {"controller_node.lwa": 1}}, "lwa"),

@@ -165,6 +165,31 @@ def test_a_take_of_other_pins_is_the_end_of_a_whole_run(
     assert (rows[0] or never) == (rows[1] or never)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("behaviours", "since"),
+    [
+        ([{"at": 0.4, "until": 1.5, "do": "brace"}], 1.5),
+        ([{"at": 0.4, "until": 1.9, "do": "brace"}], 1.7),
+        ([{"at": 0.4, "until": 1.2, "do": "brace"}, {"at": 1.3, "do": "react"}], 1.2),
+        ([{"at": 1.9, "do": "react"}], 0.4),
+    ],
+    ids=["sooner", "later", "another one", "none"],
+)
+def test_a_take_of_other_behaviours_is_the_end_of_a_whole_run(
+    tmp_path: Path, behaviours: list[dict[str, Any]], since: float
+) -> None:
+    braced = [{"at": 0.4, "until": 1.7, "do": "brace"}]
+    first = make_take(planned_take(written(tmp_path, behaviours=braced), None))
+    file = written(tmp_path, behaviours=behaviours)
+
+    take = make_take(planned_take(file, first))
+
+    assert take.since == pytest.approx(since)
+    assert take.begin >= since - 0.5 - 1 / RATE
+    assert_same_end(take, whole_run(file, tmp_path / "whole"))
+
+
 def test_nothing_is_simulated_where_nothing_has_changed(first: Take) -> None:
     planned = planned_take(edited(first), first)
 

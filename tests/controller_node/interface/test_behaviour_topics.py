@@ -302,6 +302,37 @@ def test_strengths_begin_at_their_stamp_are_echoed_and_refused_in_a_line(
     ]
 
 
+def test_behaviours_begin_at_their_stamp_are_echoed_and_refused_in_a_line(
+    processes: Processes, simulator: ControllerClient
+) -> None:
+    def asked(*names: str, tick: int = 0) -> JointState:
+        return joint_state(CLOCK.stamp_ns(tick) if tick else 0, names)
+
+    node = processes.controller("humanoid", behaviour="active_ragdoll", limp__threshold=30.0)
+    driver = Ticks(simulator)
+    active = simulator.listen(topics.ACTIVE_BEHAVIOUR.of(CONTROLLER))
+    sender = simulator.speak(topics.BEHAVIOUR.of(CONTROLLER))
+    driver.next()
+    simulator.spin_until(sender.get_subscription_count, "a subscriber")
+
+    for wrong in (asked("tumble"), asked("react", "brace"), asked("react", tick=1)):
+        sender.publish(wrong)
+    sender.publish(asked("track"))
+    sender.publish(asked("react", tick=2000))
+    while len(active) < 2:
+        driver.next()
+    driver.tick = 1996
+    for _ in range(5):
+        driver.next(force=24_000.0)
+    driver.wait_told([("TRACK", 1), ("LIMP", 2000)])
+
+    assert [list(each.name) for each in active.messages] == [["track"], ["react"]]
+    assert stamp_ns(active.last) == CLOCK.stamp_ns(2000)
+    lines = [line for line in node.stderr.splitlines() if "refused behaviour" in line]
+    words = ("'tumble'", "2 names", "over")
+    assert all(word in line for word, line in zip(words, lines, strict=True))
+
+
 def test_contacts_whose_states_never_come_are_dropped_and_it_is_logged_once(
     processes: Processes, simulator: ControllerClient
 ) -> None:
