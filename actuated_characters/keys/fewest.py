@@ -21,11 +21,11 @@ def fewest_keys(
 ) -> FewestKeys:
     """Find few keys whose smooth path is within tolerances of a motion at each sample.
 
-    Keys begin at each frame. The least needed one is taken away while values, and then times, of
-    its neighbours make up for it: so poses are near the motion's and not quite on it. Times are
-    multiples of 1 ms, two of them at least half a frame apart, values of 0.1 mrad and 0.1 mm. The
-    path is at rest at its ends; where the motion is not, keys are closer there. Where a frame is so
-    far from the next that the path does not reach it, there are keys between frames, too.
+    Keys begin at each frame. The least needed one is taken away while values and velocities, and
+    then times, of its neighbours make up for it: so poses are near the motion's and not quite on
+    it. Times are multiples of 1 ms, two of them at least half a frame apart, values of 0.1 mrad and
+    0.1 mm. Where a frame is so far from the next that the path does not reach it, there are keys
+    between frames, too.
 
     The same motion gives the same keys.
 
@@ -40,7 +40,7 @@ def fewest_keys(
     scale = _of_entries(layout, tolerances)
     coordinates = _coordinates(layout, samples, scale)
     goal = _goal(layout, samples, scale, bounds, loops=loops)
-    keys = _keys_of_frames(goal, samples.times, coordinates)
+    keys = _keys_of_frames(goal, samples.times)
     keys = Thinning(goal, keys, progress).thin()
     written = WrittenPath(layout, samples, coordinates, scale, bounds)
     return written.corrected(goal, keys)
@@ -80,13 +80,13 @@ def _goal(
     return goal.looped(Loop(float(samples.times[-1]), goal.values[-1] - goal.values[0]))
 
 
-def _keys_of_frames(goal: Goal, times: FloatArray, values: FloatArray) -> Keys:
-    """A key at each frame of samples (m,), (m, n), and between two where the path needs it."""
-    is_key = np.arange(len(times)) % 2 == 0
+def _keys_of_frames(goal: Goal, times: FloatArray) -> Keys:
+    """A key at each frame of samples (m,), and between two where the path needs it."""
+    is_key, states = np.arange(len(times)) % 2 == 0, goal.states(times)
     while True:
         rows = np.flatnonzero(is_key[:-1] if goal.loop else is_key)
-        keys = Keys(times[rows], values[rows])
-        missed = goal.lengths(path_of(goal, keys, times) - values).max(axis=1) > 1.0
+        keys = Keys(times[rows], states[rows])
+        missed = goal.lengths(path_of(goal, keys, times) - states[:, 0]).max(axis=1) > 1.0
         if not (missed & ~is_key).any():
             return keys
         is_key |= missed

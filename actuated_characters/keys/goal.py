@@ -8,24 +8,24 @@ import numpy as np
 from actuated_characters.keys.path_weights import path_values, path_weights
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 
-_REACH = 3  # keys on each side whose values or times a part of the path between keys depends on
+_REACH = 3  # keys on each side whose states or times a part of the path between keys depends on
 
 
 @dataclass(frozen=True)
 class Keys:
-    """Keys at rising times: values are unrolled coordinates in tolerances."""
+    """Keys at rising times: unrolled coordinates in tolerances, and their rates a second."""
 
     times: FloatArray  # (p,) s
-    values: FloatArray  # (p, n)
+    states: FloatArray  # (p, 2, n)
 
     def without(self, index: int) -> "Keys":
         """All keys but one."""
-        return Keys(np.delete(self.times, index), np.delete(self.values, index, axis=0))
+        return Keys(np.delete(self.times, index), np.delete(self.states, index, axis=0))
 
-    def inserted(self, time: float, value: FloatArray) -> "Keys":
-        """The keys with one more at a time in s, whose value is (n,)."""
+    def inserted(self, time: float, state: FloatArray) -> "Keys":
+        """The keys with one more at a time in s, whose state is (2, n)."""
         row = int(np.searchsorted(self.times, time))
-        return Keys(np.insert(self.times, row, time), np.insert(self.values, row, value, axis=0))
+        return Keys(np.insert(self.times, row, time), np.insert(self.states, row, state, axis=0))
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,13 @@ class Goal:
         lengths: FloatArray = np.sqrt(np.add.reduceat(entries * entries, self.starts, axis=-1))
         return lengths
 
+    def states(self, times: FloatArray) -> FloatArray:
+        """The motion (p, 2, n) at times (p,) in s, and its rates."""
+        rates = np.gradient(self.values, self.times, axis=0)
+        columns = np.concatenate((self.values, rates), axis=1).T
+        found = np.array([np.interp(times, self.times, column) for column in columns]).T
+        return found.reshape(len(times), 2, -1)
+
     def looped(self, loop: Loop) -> "Goal":
         """That of a loop, of the samples of one period."""
         laps = range(-1, 2)
@@ -70,15 +77,13 @@ class Goal:
 def path_of(goal: Goal, keys: Keys, times: FloatArray) -> FloatArray:
     """Values (m, n) of the path through all keys at times (m,) in s."""
     if goal.loop is None:
-        return path_values(keys.times, keys.values, times)
+        return path_values(keys.times, keys.states, times)
     count = len(keys.times)
     places = np.arange(-_REACH, count + _REACH)
     laps = places // count
-    return path_values(
-        keys.times[places % count] + laps * goal.loop.period,
-        keys.values[places % count] + laps[:, np.newaxis] * goal.loop.lap,
-        times,
-    )
+    states = keys.states[places % count]
+    states[:, 0] += laps[:, np.newaxis] * goal.loop.lap
+    return path_values(keys.times[places % count] + laps * goal.loop.period, states, times)
 
 
 @dataclass(frozen=True)
@@ -89,10 +94,10 @@ class Window:
     """
 
     keys: IntArray  # (u,) which of the keys
-    free: BoolArray  # (u,) whose value is free
+    free: BoolArray  # (u,) whose state is free
     movable: BoolArray  # (u,) whose time is free, too
     times: FloatArray  # (u,) s
-    values: FloatArray  # (u, n)
+    states: FloatArray  # (u, 2, n)
     copies: IntArray  # (e,) which key of the window stands at each place, in the order of time
     laps: FloatArray  # (e, 1) how many periods later
     rows: slice  # of the samples of the goal
@@ -126,7 +131,7 @@ def open_window(goal: Goal, keys: Keys, chosen: Sequence[int], left_out: int | N
         free,
         free & ~is_end,
         keys.times[window_keys],
-        keys.values[window_keys],
+        keys.states[window_keys],
         copies,
         (places // count).astype(float)[:, np.newaxis],
         slice(0, 0),
@@ -147,18 +152,18 @@ def placed_times(goal: Goal, window: Window, times: FloatArray) -> FloatArray:
 
 
 def window_weights(goal: Goal, window: Window, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weights (r, u) of a window's keys at times (u,), and what is added to the path, (r, n)."""
+    """Weights (r, 2 u) of a window's keys at times (u,), and what is added to the path, (r, n)."""
     samples = goal.times[window.rows]
     placed = path_weights(placed_times(goal, window, times), samples)
     if goal.loop is None:
         return placed, np.zeros((len(samples), len(goal.bounds[0])))
-    fold = window.copies[:, np.newaxis] == np.arange(len(window.keys))
-    return placed @ fold.astype(float), placed @ (window.laps * goal.loop.lap)
+    fold = (window.copies[:, np.newaxis] == np.arange(len(window.keys))).astype(float)
+    return placed @ np.kron(fold, np.eye(2)), placed[:, ::2] @ (window.laps * goal.loop.lap)
 
 
-def window_path(goal: Goal, window: Window, times: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (r, n) of the path through a window's keys at times (u,) with values (u, n)."""
-    placed = values[window.copies]
+def window_path(goal: Goal, window: Window, times: FloatArray, states: FloatArray) -> FloatArray:
+    """Values (r, n) of the path through a window's keys at times (u,) with states (u, 2, n)."""
+    placed = states[window.copies]
     if goal.loop is not None:
-        placed = placed + window.laps * goal.loop.lap
+        placed[:, 0] += window.laps * goal.loop.lap
     return path_values(placed_times(goal, window, times), placed, goal.times[window.rows])

@@ -11,9 +11,9 @@ import yaml
 
 from controller_node.references.files.keyframes import Keyframes
 from msgs_config.arrays import FloatArray
-from msgs_config.character.layout import JointLayout
+from msgs_config.character.layout import JointLayout, LayoutJoint
 
-_DIGITS = 4  # of values, rad and m
+_DIGITS = 4  # of values and velocities, rad and m, and these a second
 _PLAIN_NAME = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -51,29 +51,35 @@ def _text(
     lines = [*(f"# {line}" for line in remark.splitlines()), *head]
     indent = " " * (len(item) - len(item.lstrip(" -")))
     before: FloatArray | None = None
-    for time, pose in zip(keyframes.times, keyframes.configurations.position, strict=True):
+    poses = np.round(keyframes.configurations.position, _DIGITS)
+    velocities = keyframes.velocities
+    if velocities is None:
+        velocities = np.full_like(poses, np.nan)
+    for time, pose, velocity in zip(keyframes.times, poses, velocities, strict=True):
         lines.append(f"{item}: {_number(float(time), 6)}")
-        joints = _joints(layout, pose, before)
-        lines.append(f"{indent}pose: {{" + f",\n{indent}       ".join(joints) + "}")
+        changed = [
+            joint
+            for joint in layout.joints
+            if before is None or (pose[joint.entries] != before[joint.entries]).any()
+        ]
+        lines += _mapping(f"{indent}pose: ", changed, pose)
+        moving = [joint for joint in layout.joints if not np.isnan(velocity[joint.entries]).any()]
+        if moving:
+            lines += _mapping(f"{indent}velocity: ", moving, velocity)
         before = pose
     return "\n".join(lines) + "\n"
 
 
-def _joints(layout: JointLayout, pose: FloatArray, before: FloatArray | None) -> list[str]:
-    """A text for each joint, or each vector of the root, that is not what it was before."""
-    texts = []
-    for joint in layout.joints:
-        for entries in joint.vectors:
-            values = np.round(pose[entries], _DIGITS)
-            if before is None or (values != np.round(before[entries], _DIGITS)).any():
-                names = layout.dof_names[entries]
-                texts.append(
-                    ", ".join(
-                        f"{_name(name)}: {_number(float(value), _DIGITS)}"
-                        for name, value in zip(names, values, strict=True)
-                    )
-                )
-    return texts
+def _mapping(key: str, joints: Sequence[LayoutJoint], values: FloatArray) -> list[str]:
+    """The lines of a mapping of the values (n,) of some joints, each on a line of its own."""
+    texts = [
+        ", ".join(
+            f"{_name(name)}: {_number(float(value), _DIGITS)}"
+            for name, value in zip(joint.dof_names, values[joint.entries], strict=True)
+        )
+        for joint in joints
+    ]
+    return (f"{key}{{" + f",\n{' ' * (len(key) + 1)}".join(texts) + "}").split("\n")
 
 
 def _name(name: str) -> str:

@@ -2,47 +2,47 @@
 
 import numpy as np
 
-from controller_node.references.curve import QUINTIC
+from controller_node.references.curve import QUINTIC, around_knots, cubic_accelerations
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 
-def path_values(keys: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Values (m, n) at m times of the path through keys that have values (p, n).
+def path_values(keys: FloatArray, states: FloatArray, times: FloatArray) -> FloatArray:
+    """Values (m, n) at m times of the path through keys that have values and rates (p, 2, n).
 
-    The path is that of `controller_node.references.keyframes.curve_through`, which is linear in the
-    values at its keys: at rest at both ends, elsewhere as the parabola through three keys moves.
+    The path is that of `controller_node.references.curve.smooth_knots` with these rates, which is
+    linear in them and in the values.
 
     Args:
         keys: Times (p,) of two keys or more, rising, in s.
-        values: Of each key, of any unit.
+        states: Of each key the value, of any unit, and its rate, a second.
         times: Times (m,) in s, from the first key to the last.
     """
-    durations = keys[1:] - keys[:-1]
-    slopes = (values[1:] - values[:-1]) / durations[:, np.newaxis]
-    before, after = durations[:-1, np.newaxis], durations[1:, np.newaxis]
-    velocities, accelerations = np.zeros((2, *values.shape))  # at rest at both ends
-    velocities[1:-1] = (slopes[:-1] * after + slopes[1:] * before) / (before + after)
-    accelerations[1:-1] = 2.0 * (slopes[1:] - slopes[:-1]) / (before + after)
+    values, rates = states[:, 0], states[:, 1]
+    durations = np.diff(keys)
+    slopes = np.diff(values, axis=0) / durations[:, np.newaxis]
+    around = around_knots(slopes, durations[:, np.newaxis], loops=False)
+    accelerations = cubic_accelerations(*around, rates)
     segments = np.searchsorted(keys, times, side="right").clip(1, len(durations)) - 1
     lasts = durations[segments]
     u = ((times - keys[segments]) / lasts).clip(0.0, 1.0)
     shares = fixed_order.powers(u, len(QUINTIC) + 1)[:, 1:] @ QUINTIC  # of the end, and of rates
     factors = np.array((np.ones_like(lasts), lasts, lasts, lasts * lasts, lasts * lasts))
-    end, first_velocity, last_velocity, first_rate, last_rate = (shares.T * factors)[
+    end, first_rate, last_rate, first_second_rate, last_second_rate = (shares.T * factors)[
         ..., np.newaxis
     ]
     path: FloatArray = (
         (1.0 - end) * values[segments]
         + end * values[segments + 1]
-        + first_velocity * velocities[segments]
-        + last_velocity * velocities[segments + 1]
-        + first_rate * accelerations[segments]
-        + last_rate * accelerations[segments + 1]
+        + first_rate * rates[segments]
+        + last_rate * rates[segments + 1]
+        + first_second_rate * accelerations[segments]
+        + last_second_rate * accelerations[segments + 1]
     )
     return path
 
 
 def path_weights(keys: FloatArray, times: FloatArray) -> FloatArray:
-    """Weights (m, p) of the values at p keys in the path's values at m times in s."""
-    return path_values(keys, np.eye(len(keys)), times)
+    """Weights (m, 2 p) of the values and rates of p keys, in turn, in the path at m times in s."""
+    size = 2 * len(keys)
+    return path_values(keys, np.eye(size).reshape(-1, 2, size), times)

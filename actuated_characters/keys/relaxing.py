@@ -1,4 +1,4 @@
-"""Values and times of neighbouring keys for which the largest error of the path is least."""
+"""States and times of neighbouring keys for which the largest error of the path is least."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from actuated_characters.keys.goal import (
 )
 from msgs_config.arrays import FloatArray, IntArray
 
-_FIRST_ROUNDS, _ROUNDS = 6, 4  # of reweighting, of values that are new and of known ones
+_FIRST_ROUNDS, _ROUNDS = 6, 4  # of reweighting, of states that are new and of known ones
 _STEPS, _MAX_FAILURES = 30, 6  # of times, and how many may bring nothing
 _DAMPING, _LEAST_DAMPING = 0.3, 1e-3  # of a step of times, as shares of the curvature
 _LESS, _MORE = 0.4, 3.0  # factors on it after a step that was good, or was not
@@ -27,11 +27,11 @@ _NUDGE = 1e-7  # s, by which a time is moved to see what changes
 
 @dataclass(frozen=True)
 class _Fit:
-    """Values (f, n) of the free keys for some times, and what is left of the motion."""
+    """States of the keys for some times, and what is left of the motion."""
 
     times: FloatArray  # (u,) s
-    values: FloatArray  # (u, n)
-    weights: FloatArray  # (r, u) of the path
+    states: FloatArray  # (u, 2, n)
+    weights: FloatArray  # (r, 2 f) of the free values and rates in the path
     path: FloatArray  # (r, n)
     left: FloatArray  # (r, n) what the path lacks, in tolerances
     importance: FloatArray  # (r, b) of each vector of each sample
@@ -59,7 +59,7 @@ def relax(
         keys: All keys.
         chosen: The first and the last of the keys that are free, side by side.
         left_out: A key that is taken as if it were not there; the keys still have it.
-        moves: Whether their times are free, too, and not their values alone.
+        moves: Whether their times are free, too, and not their values and rates alone.
         aim: The error, in tolerances, at which it is good enough.
     """
     window = open_window(goal, keys, chosen, left_out)
@@ -75,43 +75,46 @@ def relax(
             best, damping = tried, max(_LESS * damping, _LEAST_DAMPING)
         else:
             damping, failures = _MORE * damping, failures + 1
-    all_times, all_values = keys.times.copy(), keys.values.copy()
-    all_times[window.keys], all_values[window.keys] = best.times, best.values
-    return best.error, Keys(all_times, all_values)
+    all_times, all_states = keys.times.copy(), keys.states.copy()
+    all_times[window.keys], all_states[window.keys] = best.times, best.states
+    return best.error, Keys(all_times, all_states)
 
 
 def _fitted(goal: Goal, window: Window, times: FloatArray, before: _Fit | None, aim: float) -> _Fit:
-    """The values at some times, by least squares whose weights follow the error (Lawson 1961)."""
+    """The states at some times, by least squares whose weights follow the error (Lawson 1961)."""
     weights, added = window_weights(goal, window, times)
-    free, held = weights[:, window.free], window.values[~window.free]
-    wanted = goal.values[window.rows] - added - weights[:, ~window.free] @ held
+    is_free, entries = np.repeat(window.free, 2), len(goal.bounds[0])
+    free, held = weights[:, is_free], window.states[~window.free].reshape(-1, entries)
+    wanted = goal.values[window.rows] - added - weights[:, ~is_free] @ held
     count = len(goal.starts)
     importance = np.ones((len(wanted), count)) if before is None else before.importance
     lower, upper = goal.bounds
-    values = left = np.empty(0)
+    values: FloatArray | None = None
+    left = wanted
     worst = np.full(count, np.inf)
     vector_of = _vector_of(goal)
     for _ in range(_FIRST_ROUNDS if before is None else _ROUNDS):
         matrices, weighted = _normal_equations(free, importance[:, vector_of])
         right = (weighted @ wanted.T[:, :, np.newaxis])[..., 0]
-        found = np.linalg.solve(matrices, right[..., np.newaxis])[..., 0].T
-        found = np.clip(found, lower, upper)
+        found = np.asarray(np.linalg.solve(matrices, right[..., np.newaxis])[..., 0].T)
+        found[::2] = np.clip(found[::2], lower, upper)
         rest = wanted - free @ found
         lengths = goal.lengths(rest)
         largest = lengths.max(axis=0)
         better = largest < worst
         columns = better[vector_of]
-        values = found if not values.size else np.where(columns, found, values)
-        left = rest if not left.size else np.where(columns, rest, left)
+        values = np.where(columns, found, found if values is None else values)
+        left = np.where(columns, rest, left)
         worst = np.where(better, largest, worst)
         if worst.max() <= _ENOUGH * aim:
             break
         importance = importance * (lengths / np.maximum(largest, _RIDGE) + _FLOOR)
         importance /= importance.max(axis=0)
-    all_values = window.values.copy()
-    all_values[window.free] = values
+    assert values is not None
+    states = window.states.copy()
+    states[window.free] = values.reshape(-1, 2, entries)
     path = goal.values[window.rows] - left
-    return _Fit(times, all_values, weights, path, left, importance, worst)
+    return _Fit(times, states, free, path, left, importance, worst)
 
 
 def _normal_equations(weights: FloatArray, importance: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -124,18 +127,18 @@ def _normal_equations(weights: FloatArray, importance: FloatArray) -> tuple[Floa
 
 
 def _step_of_times(goal: Goal, window: Window, fit: _Fit, damping: float) -> FloatArray:
-    """By how many s to move each key that may move, by Gauss-Newton with the values projected out.
+    """By how many s to move each key that may move, by Gauss-Newton with the states projected out.
 
     Source: Golub and Pereyra 1973, "variable projection".
     """
     room_back, room_on = _free_room(goal, window, fit.times)
     changes = [
-        (window_path(goal, window, times, fit.values) - fit.path) / _NUDGE
+        (window_path(goal, window, times, fit.states) - fit.path) / _NUDGE
         for times in fit.times + _NUDGE * np.eye(len(fit.times))[window.movable]
     ]
     emphasis = (fit.worst / fit.error) ** (2 * _EMPHASIS)
     importance = (fit.importance * emphasis + 1e-12)[:, _vector_of(goal)]
-    free = fit.weights[:, window.free]
+    free = fit.weights
     matrices, weighted = _normal_equations(free, importance)
     columns = np.stack((*changes, fit.left), axis=-1).swapaxes(0, 1)  # (n, r, moves + 1)
     projected = columns - free @ np.linalg.solve(matrices, weighted @ columns)

@@ -7,10 +7,11 @@ import numpy as np
 from actuated_characters.keys.goal import Goal, Keys
 from actuated_characters.keys.relaxing import relax
 
-_NEAR, _NEAR_MOVING = 3, 4  # keys on each side that make up for one, without and with their times
+_NEAR, _NEAR_MOVING = 3, 3  # keys on each side that make up for one, without and with their times
 _AFFECTED = 5  # keys on each side of one that is gone, whose own cost is another one then
 _HOPELESS = 6.0  # tolerances, beyond which moving the neighbours' times is not tried
-_SWEEPS, _SWEPT, _SWEEP_STEP, _SWEEP_AIM = 2, 8, 4, 0.3
+_MERGED_WITH = (-1, 1, -1)  # the key that meets one that is gone half-way, in each round
+_SWEPT, _SWEEP_STEP, _SWEEP_AIM = 8, 4, 0.3
 _FEWEST_OPEN, _FEWEST_OF_LOOP = 2, 3
 
 Progress = Callable[[float], None]
@@ -24,6 +25,7 @@ class Thinning:
         self.keys = keys
         self._goal, self._report, self._done = goal, progress, 0.0
         self._costs = np.zeros(0)  # (p,) largest error without a key, in tolerances
+        self._stale = np.zeros(0, dtype=np.bool_)  # (p,) whether that was before others changed
         self._tried = np.zeros(0, dtype=np.bool_)  # (p,) whether moving times did not help
         self._begin = len(keys.times)
 
@@ -31,11 +33,10 @@ class Thinning:
         """Take away all that can be done without, and move those that are left where this helps."""
         self._assess()
         self._take_away()
-        for _ in range(_SWEEPS):
-            self._take_away_moving()
+        for neighbour in _MERGED_WITH:
+            self._take_away_moving(neighbour)
             self._sweep()
             self._assess()
-        self._take_away_moving()
         return self.keys
 
     def _progress(self, share: float) -> None:
@@ -46,12 +47,12 @@ class Thinning:
     def _assess(self) -> None:
         count = len(self.keys.times)
         self._costs = np.array([self._cost(key) for key in range(count)])
-        self._tried = np.zeros(count, dtype=np.bool_)
+        self._stale, self._tried = np.zeros((2, count), dtype=np.bool_)
 
     def _cost(self, key: int) -> float:
         if not self._is_removable(key):
             return np.inf
-        return self._without(key, _NEAR, moves=False)[0]
+        return self._without(key)[0]
 
     def _is_removable(self, key: int) -> bool:
         """Whether a key may go: the first one stays, and the last one of what is no loop."""
@@ -60,43 +61,61 @@ class Thinning:
             return False
         return 0 < key < count - 1 or (loops and key > 0)
 
-    def _without(self, key: int, near: int, *, moves: bool) -> tuple[float, Keys]:
-        chosen = (key - near, key + near)
-        return relax(self._goal, self.keys, chosen, left_out=key, moves=moves)
+    def _without(self, key: int) -> tuple[float, Keys]:
+        chosen = (key - _NEAR, key + _NEAR)
+        return relax(self._goal, self.keys, chosen, left_out=key, moves=False)
+
+    def _merged(self, key: int, neighbour: int) -> tuple[float, Keys]:
+        """The error without a key, and the keys near it moved; a neighbour begins half-way."""
+        keys, chosen = self.keys, (key - _NEAR_MOVING, key + _NEAR_MOVING)
+        if 0 < key + neighbour < len(keys.times) - 1:
+            times, states = keys.times.copy(), keys.states.copy()
+            for each in (times, states):
+                each[key + neighbour] = 0.5 * (each[key] + each[key + neighbour])
+            keys = Keys(times, states)
+        return relax(self._goal, keys, chosen, left_out=key)
 
     def _take_away(self) -> None:
-        """Take away the cheapest key, and again, while values alone make up for it."""
+        """Take away the cheapest key, and again, while others make up for it where they are."""
         while self._costs.min() <= 1.0:
             key = int(self._costs.argmin())
-            error, keys = self._without(key, _NEAR, moves=False)
-            if error > 1.0:  # its cost was that before a neighbour changed
-                self._costs[key] = error
+            if self._stale[key]:
+                self._renew(key)
                 continue
-            self._remove(key, keys)
+            _, keys = self._without(key)
+            self._remove(key, keys, _NEAR)
             self._progress(0.5 * (1.0 - len(self.keys.times) / self._begin))
 
-    def _take_away_moving(self) -> None:
-        """Take away keys for which values and times of the neighbours make up."""
+    def _take_away_moving(self, neighbour: int) -> None:
+        """Take away keys for which states and times of the neighbours make up."""
         while True:
             open_costs = np.where(self._tried, np.inf, self._costs)
             key = int(open_costs.argmin())
             if open_costs[key] > _HOPELESS:
                 break
-            error, keys = self._without(key, _NEAR_MOVING, moves=True)
+            if self._stale[key]:
+                self._renew(key)
+                continue
+            error, keys = self._merged(key, neighbour)
             self._tried[key] = True
             if error <= 1.0:
-                self._remove(key, keys)
+                self._remove(key, keys, _NEAR_MOVING)
             self._progress(0.5 + 0.4 * float(self._tried.mean()))
 
-    def _remove(self, key: int, keys: Keys) -> None:
+    def _renew(self, key: int) -> None:
+        self._costs[key] = self._cost(key)
+        self._stale[key] = False
+
+    def _remove(self, key: int, keys: Keys, near: int) -> None:
+        """Have keys without one; those near to it have changed, which is mostly at their cost."""
         self.keys = keys.without(key)
         self._costs = np.delete(self._costs, key)
-        self._tried = np.delete(self._tried, key)
+        self._stale, self._tried = np.delete([self._stale, self._tried], key, axis=1)
         count = len(self.keys.times)
-        for near in range(key - _AFFECTED - _NEAR_MOVING, key + _AFFECTED + _NEAR_MOVING):
-            if self._goal.loop is not None or 0 <= near < count:
-                self._costs[near % count] = self._cost(near % count)
-                self._tried[near % count] = False
+        others = np.arange(key - _AFFECTED - near, key + _AFFECTED + near)
+        if self._goal.loop is None:
+            others = others[(others >= 0) & (others < count)]
+        self._stale[others % count], self._tried[others % count] = True, False
 
     def _sweep(self) -> None:
         """Lower the error everywhere, which leaves room for keys to go."""

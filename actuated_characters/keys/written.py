@@ -11,9 +11,10 @@ from controller_node.references.files.keyframes import Keyframes
 from controller_node.references.keyframes import curve_through
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
+from msgs_config.geometry import rotations
 
 SHORTEST_GAP = 1e-3  # s, the unit of written times
-_DIGITS, _DIGITS_OF_END = 4, 6  # of values, rad and m, and of the time of the end, s
+_DIGITS, _DIGITS_OF_END = 4, 6  # of values and velocities, and of the time of the end, s
 _AIM = 0.95  # tolerances, where the path is corrected; the rest is for rounding
 _CORRECTIONS, _MAX_ADDED = 4, 30  # of the path before a key is added, and how many are
 _SWEPT, _SWEEP_STEP = 10, 5  # keys that are corrected at once, and by how many the next ones begin
@@ -45,17 +46,22 @@ class WrittenPath:
 
     def keyframes(self, keys: Keys, loop: Loop | None) -> Keyframes:
         """The keyframes, with values that a file has with a few digits."""
-        times = keys.times
+        times, (values, rates) = keys.times, keys.states.swapaxes(0, 1)
         here = np.stack(
             [np.interp(times, self.samples.times, column) for column in self.coordinates.T], axis=1
         )
-        way = (keys.values - here) * self.scale
-        positions = moved(self.layout, self.samples.at(self.layout, times), way).position
+        way = (values - here) * self.scale
+        poses = moved(self.layout, self.samples.at(self.layout, times), way)
         grid = 10.0**_DIGITS
         lower, upper = np.ceil(self.bounds[0] * grid) / grid, np.floor(self.bounds[1] * grid) / grid
-        positions = np.clip(np.round(positions, _DIGITS), lower, upper) + 0.0  # no negative zero
+        # adding zero leaves no negative zero
+        positions = np.clip(np.round(poses.position, _DIGITS), lower, upper) + 0.0
+        velocities, entries = rates * self.scale, self.layout.rotation_entries
+        back = rotations.conjugate(poses.orientations_xyzw)
+        velocities[:, entries] = rotations.rotate(back, velocities[:, entries])
+        velocities = np.round(velocities, _DIGITS) + 0.0
         period = None if loop is None else round(loop.period, _DIGITS_OF_END)
-        return Keyframes(times, self.layout.configuration(positions), True, period)
+        return Keyframes(times, self.layout.configuration(positions), True, period, velocities)
 
     def left(self, keyframes: Keyframes) -> FloatArray:
         """What the path lacks (m, n) at each sample, in tolerances."""
@@ -72,26 +78,54 @@ class WrittenPath:
         where this is not enough there is a key more.
         """
         keys = replace(keys, times=_rounded(keys.times, goal.loop))
+        best, keys, errors = self._led_back(goal, keys)
+        for _ in range(_MAX_ADDED):
+            if best.error <= 1.0:
+                break
+            found, keys, errors = self._led_back(goal, _with_one_more(goal, keys, errors))
+            best = min(best, found, key=lambda each: each.error)
+        return self._plainer(best, goal)
+
+    def _led_back(self, goal: Goal, keys: Keys) -> tuple[FewestKeys, Keys, FloatArray]:
+        """The best of some corrections of the path, none included, and the errors (m,) of it.
+
+        Where rotations between two keys are large, plain numbers tell little of the true path, and
+        what is corrected may be worse.
+        """
         best: FewestKeys | None = None
-        for attempt in range(_CORRECTIONS * (_MAX_ADDED + 1)):
-            keyframes = self.keyframes(keys, goal.loop)
+        tried, errors = keys, np.empty(0)
+        for _ in range(_CORRECTIONS):
+            keyframes = self.keyframes(tried, goal.loop)
             left = self.left(keyframes)
             lengths = goal.lengths(left)
             found = self._found(keyframes, lengths)
             if best is None or found.error < best.error:
-                best = found
+                best, keys, errors = found, tried, lengths.max(axis=1)
             if best.error <= 1.0:
                 break
-            if attempt % _CORRECTIONS == _CORRECTIONS - 1:
-                keys = _with_one_more(goal, keys, lengths.max(axis=1))
-                continue
-            path = path_of(goal, keys, self.samples.times)
+            path = path_of(goal, tried, self.samples.times)
             true_goal = replace(goal, times=self.samples.times, values=path + left)
             if goal.loop is not None:
                 true_goal = true_goal.looped(goal.loop)
-            keys = _refitted(true_goal, keys)
+            tried = _refitted(true_goal, tried)
         assert best is not None
-        return best
+        return best, keys, errors
+
+    def _plainer(self, found: FewestKeys, goal: Goal) -> FewestKeys:
+        """The keys without those velocities of joints that the path can do without."""
+        keyframes, most = found.keyframes, max(found.error, 1.0)
+        assert keyframes.velocities is not None
+        inner = slice(None) if goal.loop is not None else slice(1, -1)
+        for row in range(len(keyframes.times))[inner]:
+            velocities = keyframes.velocities.copy()
+            velocities[row] = np.nan
+            errors = goal.lengths(self.left(replace(keyframes, velocities=velocities))).max(axis=0)
+            errors = np.repeat(errors, self.layout.vector_lengths)
+            for joint in self.layout.joints:
+                if errors[joint.entries].max() > most:
+                    velocities[row, joint.entries] = keyframes.velocities[row, joint.entries]
+            keyframes = replace(keyframes, velocities=velocities)
+        return self._found(keyframes, goal.lengths(self.left(keyframes)))
 
     def _found(self, keyframes: Keyframes, lengths: FloatArray) -> FewestKeys:
         tolerances = self.scale[self.layout.vector_starts]
@@ -122,5 +156,4 @@ def _with_one_more(goal: Goal, keys: Keys, errors: FloatArray) -> Keys:
     time = float(np.round(0.5 * (ends[segment] + ends[segment + 1]), 3))
     if min(time - ends[segment], ends[segment + 1] - time) < SHORTEST_GAP:
         return keys
-    values = np.array([np.interp(time, goal.times, column) for column in goal.values.T])
-    return keys.inserted(time, values)
+    return keys.inserted(time, goal.states(np.array([time]))[0])

@@ -25,6 +25,9 @@ QUINTIC = np.array(
 )
 _DEGREE = len(QUINTIC)
 
+REST_TIME = 0.3
+"""s, in which a path comes from rest to a first knot that moves, or to rest from a last one."""
+
 
 @dataclass(frozen=True)
 class Knots:
@@ -156,39 +159,101 @@ def segment_offsets(layout: JointLayout, configurations: GeneralizedPosition) ->
 
 
 def smooth_knots(
-    layout: JointLayout, times: FloatArray, configurations: GeneralizedPosition, *, loops: bool
+    layout: JointLayout,
+    times: FloatArray,
+    configurations: GeneralizedPosition,
+    velocities: FloatArray | None = None,
+    *,
+    loops: bool,
 ) -> Knots:
     """Knots whose curve is continuous to the acceleration.
 
     At a configuration it moves as the parabola through this one and its two neighbours does, at the
-    two ends of what is no loop it is at rest. The last configuration of a loop is its first one.
+    two ends of what is no loop it is at rest. Where there is a velocity (p, n), and not NaN, it
+    moves as the cubic with this velocity through the three does, which is the parabola if the
+    velocity is that of the parabola. The last configuration of a loop is its first one.
     """
     durations = np.diff(times)[:, np.newaxis]
     slopes = segment_offsets(layout, configurations) / durations
-    return Knots(times, configurations, *_parabolas(slopes, durations, loops=loops))
+    around = around_knots(slopes, durations, loops=loops)
+    automatic, accelerations = _parabolas(*around)
+    if not loops:
+        for rates in (automatic, accelerations):
+            rates[[0, -1]] = 0.0
+    if velocities is None:
+        return Knots(times, configurations, automatic, accelerations)
+    is_own = ~np.isnan(velocities)
+    rates = np.where(is_own, velocities, automatic)
+    accelerations = np.where(is_own, cubic_accelerations(*around, rates), accelerations)
+    return Knots(times, configurations, rates, accelerations)
 
 
-def _parabolas(
+def around_knots(
     slopes: FloatArray, durations: FloatArray, *, loops: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Velocity and acceleration (p, n) at each knot, from slopes (p - 1, n) between them.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Slopes before and after each knot (p, n), of those (p - 1, n) between, and durations (p, 1).
 
+    Before the first and after the last knot of what is no loop it is as if that came once more.
     They are in exponential coordinates about the knot, where what leads back to the knot before is
     the negative of what leads from there.
     """
     if loops:
-        before, after = np.roll(slopes, 1, axis=0), slopes
-        time_before, time_after = np.roll(durations, 1, axis=0), durations
-    else:
-        before, after = slopes[:-1], slopes[1:]
-        time_before, time_after = durations[:-1], durations[1:]
+        rows = [-1, *range(len(slopes))]
+        return slopes[rows], closed(slopes), durations[rows], closed(durations)
+    still, rest = np.zeros((1, slopes.shape[1])), np.full((1, 1), REST_TIME)
+    return (
+        np.concatenate([still, slopes]),
+        np.concatenate([slopes, still]),
+        np.concatenate([rest, durations]),
+        np.concatenate([durations, rest]),
+    )
+
+
+def _parabolas(
+    before: FloatArray, after: FloatArray, time_before: FloatArray, time_after: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Velocity and acceleration (p, n) of the parabola with such slopes (p, n) beside its middle.
+
+    The times (p, 1) are those in s from the neighbour before, and to the one after.
+    """
     both = time_before + time_after
     velocities = (before * time_after + after * time_before) / both
     accelerations = 2.0 * (after - before) / both
-    if loops:
-        return closed(velocities), closed(accelerations)
-    ends = ((1, 1), (0, 0))  # zeros before and after: at rest at both ends
-    return np.pad(velocities, ends), np.pad(accelerations, ends)
+    return velocities, accelerations
+
+
+def cubic_accelerations(
+    before: FloatArray,
+    after: FloatArray,
+    time_before: FloatArray,
+    time_after: FloatArray,
+    velocities: FloatArray,
+) -> FloatArray:
+    """Acceleration (p, n) of the cubic with such velocities (p, n), else as `_parabolas`."""
+    share = time_before / time_after
+    accelerations: FloatArray = (
+        2.0
+        * ((after - velocities) * share + (velocities - before) / share)
+        / (time_before + time_after)
+    )
+    return accelerations
+
+
+def from_and_to_rest(knots: Knots) -> Knots:
+    """The knots, and beyond each end that moves its configuration once more, at rest."""
+    assert knots.velocities is not None and knots.accelerations is not None
+    rates = np.stack([knots.velocities, knots.accelerations])
+    rows = list(range(len(knots.times)))
+    times, still = knots.times, np.zeros((2, 1, rates.shape[2]))
+    if rates[:, 0].any():
+        rows.insert(0, 0)
+        times, rates = np.insert(times, 0, times[0] - REST_TIME), np.append(still, rates, axis=1)
+    if rates[:, -1].any():
+        rows.append(rows[-1])
+        times, rates = np.append(times, times[-1] + REST_TIME), np.append(rates, still, axis=1)
+    whole = knots.configurations
+    configurations = GeneralizedPosition(whole.position[rows], whole.orientations_xyzw[rows])
+    return Knots(times, configurations, rates[0], rates[1])
 
 
 def closed(rows: FloatArray) -> FloatArray:

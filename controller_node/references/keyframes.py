@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from controller_node.references.base import REFERENCES, Motion, ReferenceState
-from controller_node.references.curve import Curve, Knots, closed, smooth_knots
+from controller_node.references.curve import Curve, Knots, closed, from_and_to_rest, smooth_knots
 from controller_node.references.files.keyframes import Keyframes, read_keyframes
 from controller_node.references.limits import JointLimits
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
@@ -26,7 +26,8 @@ class KeyframesReference:
     """Keyframes in time.
 
     A loop goes on from the last keyframe to the first one of the next period, and is periodic from
-    time 0 on. Else the first keyframe is held until its time comes, and the last one from then on.
+    time 0 on. Else the first keyframe is held until its time comes, and the last one from then on;
+    one with a velocity comes from rest, or to rest, within `curve.REST_TIME`.
     """
 
     def __init__(self, layout: JointLayout, keyframes: Keyframes) -> None:
@@ -49,15 +50,17 @@ def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
     A smooth path is continuous to the acceleration; `smooth_knots` says how it moves.
     """
     times, configurations = keyframes.times, keyframes.configurations
+    velocities, loops = keyframes.velocities, keyframes.period is not None
     if keyframes.period is not None:
         times = np.append(times - times[0], keyframes.period)
         configurations = GeneralizedPosition(
             closed(configurations.position), closed(configurations.orientations_xyzw)
         )
+        velocities = None if velocities is None else closed(velocities)
     if not keyframes.smooth or len(times) == 1:
         return Curve(layout, Knots(times, configurations))
-    loops = keyframes.period is not None
-    return Curve(layout, smooth_knots(layout, times, configurations, loops=loops))
+    knots = smooth_knots(layout, times, configurations, velocities, loops=loops)
+    return Curve(layout, knots if loops else from_and_to_rest(knots))
 
 
 def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
@@ -73,6 +76,7 @@ def overshoots(character: Character, keyframes: Keyframes) -> tuple[str, ...]:
     for index in np.flatnonzero(np.isfinite(lower) | np.isfinite(upper)).tolist():
         times, values = curve.coordinate(index, _SHARES)
         beyond = np.maximum(lower[index] - values, values - upper[index])
+        beyond[begin + times < 0.0] = 0.0
         worst = np.unravel_index(beyond.argmax(), beyond.shape)
         if beyond[worst] > _LIMIT_TOLERANCE:
             warnings.append(

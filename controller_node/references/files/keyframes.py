@@ -2,11 +2,12 @@
 
 It has the keys `interpolation` (`smooth` or `linear`), `loop`, `period` (s) and `keyframes`, a list
 of a `time` (s) and a `pose` each: degrees of freedom by name, in rad or m. What a pose leaves out
-keeps its value of the keyframe before, at the first one that of the rest pose.
+keeps its value of the keyframe before, at the first one that of the rest pose. With a `velocity`
+(rad/s or m/s, of whole joints) a smooth path has this one there, else that of a parabola.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,11 @@ from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.character.model import Character, Placement
-from msgs_config.errors import MotionError, one_of
+from msgs_config.errors import LayoutError, MotionError, one_of
 from msgs_config.geometry import rotations
 
 _KEYS = ["interpolation", "loop", "period", "keyframes"]
-_KEYFRAME_KEYS = ["time", "pose"]
+_KEYFRAME_KEYS = ["time", "pose", "velocity"]
 _MAX_SHOWN = 200  # characters
 
 
@@ -33,6 +34,7 @@ class Keyframes:
     configurations: GeneralizedPosition  # (p, n), (p, k, 4)
     smooth: bool  # whether the path is a spline, not linear
     period: float | None = None  # s, of a loop
+    velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame; NaN: none
 
 
 def read_keyframes(character: Character, path: str) -> Keyframes:
@@ -59,11 +61,15 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
             raise MotionError(f"{place} is {_shown(item)}; it must be a mapping with 'time'")
         _check_keys(place, item, _KEYFRAME_KEYS)
     times = _times(places, items)
+    velocities = _velocities(character, places, items)
+    if velocities is not None and interpolation != "smooth":
+        raise MotionError(f"{file}: velocity is for 'interpolation: smooth'; remove it")
     return Keyframes(
         np.array(times),
         _configurations(character, _positions(character, places, items)),
         interpolation == "smooth",
         _period(file, content, times[-1]),
+        velocities,
     )
 
 
@@ -129,6 +135,30 @@ def _check_whole_rotations(place: str, layout: JointLayout, pose: dict[str, Any]
                 f"{place}: pose: '{missing[0]}' is missing; {', '.join(names)} are one rotation "
                 "vector and must come together"
             )
+
+
+def _velocities(
+    character: Character, places: list[str], items: list[dict[str, Any]]
+) -> FloatArray | None:
+    """The velocities (p, n) that the file has, NaN where it has none; None if there is none."""
+    rows = np.full((len(items), character.layout.size), np.nan)
+    for place, item, row in zip(places, items, rows, strict=True):
+        velocity = item.get("velocity")
+        velocity = {} if velocity is None else velocity
+        if not isinstance(velocity, dict):
+            raise _wrong(f"{place}: velocity", velocity, "a mapping of degrees of freedom")
+        names = tuple(map(str, velocity))
+        try:
+            entries = character.layout.indices(names)
+        except LayoutError as error:
+            raise MotionError(f"{place}: velocity: {error}") from error
+        row[entries] = [
+            _number(f"{place}: velocity.{name}", value) for name, value in velocity.items()
+        ]
+    if character.layout.has_floating_base:
+        moving, still = rows[:, :3], np.array((0.0, 0.0, 0.0, 1.0))
+        rows[:, :3] = replace(character.placement, x=0.0, y=0.0, z=0.0).moved(moving, still)[0]
+    return rows if not np.isnan(rows).all() else None
 
 
 def _rest_in_own_world(character: Character) -> FloatArray:

@@ -1,7 +1,7 @@
 """What a timeline says, as its file has it; times are s since the episode's first state."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
@@ -28,7 +28,8 @@ class Pose(Entry):
     """Degrees of freedom by name, rad or m; those that a layer has before keep their values."""
 
     values: Mapping[str, float]
-    ease: Ease = Ease.SMOOTH
+    ease: Ease = Ease.SMOOTH  # of joints without a velocity
+    velocity: Mapping[str, float] = field(default_factory=dict)  # rad/s or m/s, of whole joints
 
 
 @dataclass(frozen=True)

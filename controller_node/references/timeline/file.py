@@ -156,7 +156,7 @@ def _settings(reader: MappingReader) -> dict[str, Mapping[str, object]]:
 
 
 def _layer(reader: MappingReader, place: str) -> Layer:
-    poses = _track(place, reader.content, "poses", _pose, ("at", "pose", "ease"))
+    poses = _track(place, reader.content, "poses", _pose, ("at", "pose", "ease", "velocity"))
     if not poses:
         raise MotionError(f"{place}: poses is missing; it must be a list of one pose or more")
     _check_rising(poses, _SHORTEST)
@@ -172,7 +172,11 @@ def _pose(reader: MappingReader, place: str) -> Pose:
         raise MotionError(f"{place}: pose is empty; it must have degrees of freedom, in rad or m")
     values = {name: pose.number(name, None, *_BOUNDS) for name in pose.content}
     ease = Ease(reader.choice("ease", [each.value for each in Ease]))
-    return Pose(place, _time(reader), values, ease)
+    own = reader.part("velocity")
+    velocity = {name: own.number(name, None, *_BOUNDS) for name in own.content}
+    if velocity and ease is Ease.REST:
+        raise MotionError(f"{place}: a pose has a velocity or 'ease: rest', not both; remove one")
+    return Pose(place, _time(reader), values, ease, velocity)
 
 
 def _clip(reader: MappingReader, place: str) -> ClipEntry:

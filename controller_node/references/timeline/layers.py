@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.references.base import Reference, ReferenceState
-from controller_node.references.curve import Curve, Knots, smooth_knots
+from controller_node.references.curve import Curve, Knots, from_and_to_rest, smooth_knots
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.limits import JointLimits
 from controller_node.references.timeline.description import Ease, Layer, Pose
@@ -87,11 +87,13 @@ def layer_of_poses(character: Character, beneath: Reference, layer: Layer) -> La
     times = np.array([pose.at for pose in layer.poses])
     knots = Knots(times, layout.configuration(rows))
     if len(times) > 1:
-        knots = smooth_knots(layout, times, knots.configurations, loops=False)
+        velocities = _velocities(layout, layer, driven)
+        knots = smooth_knots(layout, times, knots.configurations, velocities, loops=False)
         rests = [pose.ease is Ease.REST for pose in layer.poses]
         for rates in (knots.velocities, knots.accelerations):
             assert rates is not None
             rates[rests] = 0.0
+        knots = from_and_to_rest(knots)
     path = Curve(layout, knots)
     span = Span(layer.poses[0].at, layer.poses[-1].at, layer.come, layer.go)
     return LayeredReference(layout, beneath, path, driven, span)
@@ -106,6 +108,21 @@ def _driven(layout: JointLayout, layer: Layer) -> IntArray:
         except LayoutError as error:
             raise MotionError(f"{pose.place}: pose: {error}") from error
     return np.array(sorted(found), dtype=np.intp)
+
+
+def _velocities(layout: JointLayout, layer: Layer, driven: IntArray) -> FloatArray | None:
+    """The velocities (p, n) that the poses have, NaN where they have none; None without any."""
+    rows = np.full((len(layer.poses), layout.size), np.nan)
+    for pose, row in zip(layer.poses, rows, strict=True):
+        try:
+            entries = layout.indices(tuple(pose.velocity))
+        except LayoutError as error:
+            raise MotionError(f"{pose.place}: velocity: {error}") from error
+        for name, entry in zip(pose.velocity, entries.tolist(), strict=True):
+            if entry not in driven:
+                raise MotionError(f"{pose.place}: velocity: no pose of the layer has '{name}'")
+        row[entries] = list(pose.velocity.values())
+    return rows if not np.isnan(rows).all() else None
 
 
 def _rows(character: Character, layer: Layer) -> FloatArray:

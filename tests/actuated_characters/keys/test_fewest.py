@@ -60,13 +60,15 @@ def test_a_quintic_from_rest_to_rest_has_two_keys() -> None:
     check(found, samples, Tolerances())
 
 
-def test_a_motion_that_begins_and_ends_fast_is_kept_at_its_ends() -> None:
-    samples = hinge(3.0 * TIMES)  # rad/s, though the path is at rest at its ends
+def test_a_motion_that_begins_and_ends_fast_needs_one_key_between_its_ends() -> None:
+    samples = hinge(3.0 * TIMES)  # rad/s
 
     found = fewest_keys(LAYOUT, samples, Tolerances(), bounds=FREE)
 
     check(found, samples, Tolerances())
-    assert len(found.keyframes.times) <= 6
+    assert len(found.keyframes.times) <= 3
+    assert found.keyframes.velocities is not None
+    assert found.keyframes.velocities[:, HINGE].min() > 1.5  # rad/s, also at both ends
 
 
 def test_a_turn_about_changing_axes_is_kept() -> None:
@@ -80,7 +82,7 @@ def test_a_turn_about_changing_axes_is_kept() -> None:
     found = fewest_keys(LAYOUT, samples, Tolerances(), bounds=FREE)
 
     check(found, samples, Tolerances())
-    assert len(found.keyframes.times) <= 121 / 5
+    assert len(found.keyframes.times) <= 121 / 10
 
 
 def test_a_larger_tolerance_needs_fewer_keys() -> None:
@@ -111,7 +113,7 @@ def test_a_loop_goes_on_with_the_speed_that_it_had() -> None:
     before, after = reference.sample(2.0 - 1e-6), reference.sample(2.0 + 1e-6)
     assert before.velocity == pytest.approx(after.velocity, abs=1e-2)
     assert before.velocity[HINGE] == pytest.approx(2.0 * math.pi, rel=0.3)
-    assert len(found.keyframes.times) <= 12
+    assert len(found.keyframes.times) <= 8
 
 
 def test_keys_stay_within_limits() -> None:
@@ -144,8 +146,9 @@ def test_the_same_motion_gives_the_same_keys() -> None:
     )
 
     assert first.times.tobytes() == second.times.tobytes()
-    positions = (each.configurations.position.tobytes() for each in (first, second))
-    assert next(positions) == next(positions)
+    assert first.configurations.position.tobytes() == second.configurations.position.tobytes()
+    assert first.velocities is not None and second.velocities is not None
+    assert first.velocities.tobytes() == second.velocities.tobytes()
 
 
 def test_progress_grows_to_the_end() -> None:

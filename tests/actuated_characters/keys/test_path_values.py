@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 
 from actuated_characters.keys.path_weights import path_values, path_weights
 from controller_node.references.files.keyframes import Keyframes
@@ -15,21 +16,26 @@ TIMES = np.array([0.0, 0.1, 0.35, 0.4, 1.0])
 def test_the_path_is_that_of_a_run(count: int) -> None:
     rng = np.random.default_rng(1)
     layout = JointLayout([("slider", JointType.PRISMATIC), ("hinge", JointType.REVOLUTE)])
-    keys, values = TIMES[:count], rng.normal(size=(count, 2))
-    keyframes = Keyframes(keys, GeneralizedPosition(values, np.empty((count, 0, 4))), smooth=True)
+    keys, states = TIMES[:count], rng.normal(size=(count, 2, 2))
+    whole = GeneralizedPosition(states[:, 0], np.empty((count, 0, 4)))
+    keyframes = Keyframes(keys, whole, smooth=True, velocities=states[:, 1])
     curve = curve_through(layout, keyframes)
     times = np.linspace(0.0, keys[-1], 77)
 
-    path = path_values(keys, values, times)
+    path = path_values(keys, states, times)
 
-    expected = [curve.sample(time).configuration.position for time in times.tolist()]
-    assert path == pytest.approx(np.array(expected), abs=1e-12)
-    assert path_weights(keys, times) @ values == pytest.approx(path, abs=1e-12)
+    expected = [curve.sample(time).configuration.position for time in times[:-1].tolist()]
+    assert path[:-1] == pytest.approx(np.array(expected), abs=1e-12)
+    assert path[-1] == pytest.approx(states[-1, 0], abs=1e-12)
+    weighted = path_weights(keys, times) @ states.reshape(-1, 2)
+    assert weighted == pytest.approx(path, abs=1e-12)
 
 
-def test_a_straight_line_is_kept_between_inner_keys() -> None:
+def test_a_cubic_is_kept_between_inner_keys() -> None:
+    cubic = Polynomial([0.3, -1.0, 2.0, -1.5])
+    states = np.stack([cubic(TIMES), cubic.deriv()(TIMES)], axis=1)[..., np.newaxis]
     times = np.linspace(0.1, 0.4, 31)
 
-    path = path_values(TIMES, 3.0 * TIMES[:, np.newaxis], times)
+    path = path_values(TIMES, states, times)
 
-    assert path[:, 0] == pytest.approx(3.0 * times, abs=1e-12)
+    assert path[:, 0] == pytest.approx(cubic(times), abs=1e-12)
