@@ -48,6 +48,7 @@ def parse(place: Path, text: str) -> dict[str, Any]:
         for pose_number, pose in enumerate(layer["poses"], 1):
             _check_time(f"{where} {pose_number}", pose)
             _check_mapping(f"{where} {pose_number}: pose", pose.get("pose"))
+            _check_mapping(f"{where} {pose_number}: velocity", pose.get("velocity") or {})
     for track in TRACKS:
         for number, event in enumerate(content.get(track, []), 1):
             _check_time(f"{place}: {track} {number}", event)

@@ -52,11 +52,17 @@ def set_layer(layer: int, name: str, value: Any) -> Edit:
     return edit
 
 
-def add_pose(layer: int, at: float, pose: Mapping[str, float], ease: str | None = None) -> Edit:
+def add_pose(
+    layer: int,
+    at: float,
+    pose: Mapping[str, float],
+    ease: str | None = None,
+    velocity: Mapping[str, float] | None = None,
+) -> Edit:
     """Add a pose (degrees of freedom by name, rad or m) to a layer at a time in s.
 
-    One that is there at this time is replaced, but for its ease. Layer 0 is made where there is
-    none.
+    One that is there at this time is replaced, but for its ease and its velocity (rad/s or m/s),
+    where none is given. Layer 0 is made where there is none.
     """
 
     def edit(content: Content) -> Content:
@@ -64,12 +70,9 @@ def add_pose(layer: int, at: float, pose: Mapping[str, float], ease: str | None 
             content = {**content, KEYS: [_FIRST_LAYER]}
         poses = list(_item(content, KEYS, layer)["poses"])
         time, found = _time(at), _row_at(poses, at)
-        added = {"at": time, "pose": {name: rounded(value) for name, value in pose.items()}}
-        given = ease or (None if found is None else poses[found].get("ease"))
-        if given is not None:
-            added["ease"] = given
-        if found is not None:
-            added["at"] = poses.pop(found)["at"]
+        before = {"at": time} if found is None else poses.pop(found)
+        added = _with_velocity({**before, "pose": _all_rounded(pose)}, velocity)
+        added = added if ease is None else _eased(added, ease)
         return _with_poses(content, layer, [*poses, added])
 
     return edit
@@ -110,12 +113,17 @@ def delete_pose(layer: int, number: int) -> Edit:
     return edit
 
 
-def set_pose(layer: int, number: int, pose: Mapping[str, float]) -> Edit:
-    """Replace what a pose says (rad or m), such as by its mirror image."""
+def set_pose(
+    layer: int,
+    number: int,
+    pose: Mapping[str, float],
+    velocity: Mapping[str, float] | None = None,
+) -> Edit:
+    """Replace what a pose says (rad or m), such as by its mirror image; None keeps its velocity."""
 
     def edit(content: Content) -> Content:
-        values = {name: rounded(value) for name, value in pose.items()}
-        changed = {**_pose(content, layer, number), "pose": values}
+        replaced = {**_pose(content, layer, number), "pose": _all_rounded(pose)}
+        changed = _with_velocity(replaced, velocity)
         return _with_poses(content, layer, _with(content[KEYS][layer]["poses"], number, changed))
 
     return edit
@@ -132,10 +140,10 @@ def set_pose_value(layer: int, number: int, name: str, value: float) -> Edit:
 
 
 def set_ease(layer: int, number: int, ease: str) -> Edit:
-    """Set how a pose is moved through: `smooth` or `rest`."""
+    """Set how a pose is moved through: `smooth` or `rest`, which has no velocity."""
 
     def edit(content: Content) -> Content:
-        changed = {**_pose(content, layer, number), "ease": ease}
+        changed = _eased(_pose(content, layer, number), ease)
         return _with_poses(content, layer, _with(content[KEYS][layer]["poses"], number, changed))
 
     return edit
@@ -223,6 +231,27 @@ def _time(at: object) -> float:
     if not is_number(at) or at < 0.0:
         raise MotionError(f"at is {at!r}; it must be a time in s, 0 or more")
     return rounded(at)
+
+
+def _all_rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: rounded(value) for name, value in values.items()}
+
+
+def _with_velocity(
+    pose: Mapping[str, Any], velocity: Mapping[str, float] | None
+) -> Mapping[str, Any]:
+    """A pose with another velocity, without one if that is empty; None is the one it has."""
+    if velocity is None:
+        return pose
+    if not velocity:
+        return _with_value(pose, "velocity", None)
+    pose = _with_value(pose, "ease", None) if pose.get("ease") == "rest" else pose
+    return {**pose, "velocity": _all_rounded(velocity)}
+
+
+def _eased(pose: Mapping[str, Any], ease: str) -> dict[str, Any]:
+    """A pose that is moved through in another way: one to rest in has no velocity."""
+    return {**(_with_value(pose, "velocity", None) if ease == "rest" else pose), "ease": ease}
 
 
 def _row_at(poses: list[Any], at: float) -> int | None:

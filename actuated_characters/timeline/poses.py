@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.timeline.content import is_number
-from character_motion.clips.mirroring import counterpart, mirrored_motion
+from character_motion.clips.mirroring import counterpart, mirrored_motion, mirrored_rates
 from character_motion.clips.motion_clip import MotionClip
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.character.model import Character
@@ -72,3 +72,21 @@ def mirrored_values(
     image = mirrored(character, whole_poses(character, poses)[number])
     named = joints_of(character, poses[number]["pose"])
     return values_of(character, image, (counterpart(character, name) for name in named))
+
+
+def mirrored_velocity(character: Character, velocity: Mapping[str, Any]) -> dict[str, float]:
+    """A pose's velocity mirrored, rad/s or m/s by name.
+
+    Names that are none of the character's, and what is no number, are left out.
+
+    Raises:
+        ClipError: the character is not its own image.
+    """
+    names = character.layout.dof_names
+    rates = [velocity[name] if is_number(velocity.get(name)) else np.nan for name in names]
+    (image,) = mirrored_rates(character, np.array([rates]))
+    return {
+        name: float(rate)
+        for name, rate in zip(names, image.tolist(), strict=True)
+        if not np.isnan(rate)
+    }

@@ -27,24 +27,39 @@ def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
         ClipError: the character is not its own image.
     """
     character, layout = clip.character, clip.character.layout
-    origins, turns = _at_rest(character)
-    rows = {link.joint.name: row for row, link in enumerate(character.links)}
     positions = clip.motion.position.copy()
     result = clip.motion.orientations_xyzw.copy()
-    index = {int(start): k for k, start in enumerate(layout.rotation_entries[:, 0])}
-    for joint in layout.joints:
-        other = layout.joint(counterpart(character, joint.name))
+    positions[:, layout.rotation_entries] = rotations.log(result)
+    positions = mirrored_rates(character, positions)
+    for k, entries in enumerate(layout.rotation_entries):
+        result[:, k] = rotations.exp(positions[:, entries])
+    if layout.has_floating_base:
+        result[:, 0] = _mirrored_root(clip, _at_rest(character)[1][0])
+        positions[:, 3:6] = rotations.log(result[:, 0])
+    lower, upper = character.position_bounds()
+    return GeneralizedPosition(np.clip(positions, lower, upper), result)
+
+
+def mirrored_rates(character: Character, rates: FloatArray) -> FloatArray:
+    """Velocities (f, n) in the mirror y -> -y; those of turns are in the child frame, or its log.
+
+    Raises:
+        ClipError: the character is not its own image.
+    """
+    origins, turns = _at_rest(character)
+    rows = {link.joint.name: row for row, link in enumerate(character.links)}
+    result = rates.copy()
+    for joint in character.layout.joints:
+        other = character.layout.joint(counterpart(character, joint.name))
         row, image = rows[joint.name], rows[other.name]
         if joint.type is not other.type or not _is_image(origins[row], origins[image]):
             raise _unequal(character, joint.name)
         if joint.rotation is not None:
-            k, source = index[joint.rotation.start], index[other.rotation.start]  # type: ignore[union-attr]
-            own = rotations.log(clip.motion.orientations_xyzw[:, source])
-            in_world = rotations.rotate(turns[image], own)  # own is an axial vector
+            assert other.rotation is not None
+            in_world = rotations.rotate(turns[image], rates[:, other.rotation])  # axial vectors
             mirrored = in_world * np.array((-1.0, 1.0, -1.0))
             back = rotations.rotate(rotations.conjugate(turns[row]), mirrored)
-            result[:, k] = rotations.exp(back)
-            positions[:, joint.rotation] = back
+            result[:, joint.rotation] = back
         else:
             axis = rotations.rotate(turns[row], np.array(character.links[row].joint.axis_in_child))
             image_axis = rotations.rotate(
@@ -53,13 +68,10 @@ def mirrored_motion(clip: MotionClip) -> GeneralizedPosition:
             along = float(image_axis * np.array((-1.0, 1.0, -1.0)) @ axis)
             if abs(abs(along) - 1.0) > _MAX_MIRROR_ERROR:
                 raise _unequal(character, joint.name)
-            positions[:, joint.start] = np.sign(along) * clip.motion.position[:, other.start]
-    if layout.has_floating_base:
-        positions[:, :3] = clip.motion.position[:, :3] * np.array((1.0, -1.0, 1.0))
-        result[:, 0] = _mirrored_root(clip, turns[0])
-        positions[:, 3:6] = rotations.log(result[:, 0])
-    lower, upper = character.position_bounds()
-    return GeneralizedPosition(np.clip(positions, lower, upper), result)
+            result[:, joint.start] = np.sign(along) * rates[:, other.start]
+    if character.layout.has_floating_base:
+        result[:, :3] = rates[:, :3] * np.array((1.0, -1.0, 1.0))
+    return result
 
 
 def _mirrored_root(clip: MotionClip, at_rest: FloatArray) -> FloatArray:

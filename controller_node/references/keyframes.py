@@ -57,7 +57,7 @@ def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
             closed(configurations.position), closed(configurations.orientations_xyzw)
         )
         velocities = None if velocities is None else closed(velocities)
-    if not keyframes.smooth or len(times) == 1:
+    if not keyframes.smooth or (len(times) == 1 and velocities is None):
         return Curve(layout, Knots(times, configurations))
     knots = smooth_knots(layout, times, configurations, velocities, loops=loops)
     return Curve(layout, knots if loops else from_and_to_rest(knots))

@@ -18,6 +18,7 @@ from actuated_characters.timeline.poses import (
     joints_of,
     mirrored,
     mirrored_values,
+    mirrored_velocity,
     values_of,
     whole_poses,
 )
@@ -50,7 +51,7 @@ class Session:
         """Another one after each pose by hand."""
         self.seen: Callable[[float], FloatArray | None] = lambda time: None
         """What is seen in the place of keys at a time in s, such as a take; (n,) message form."""
-        self._copied: dict[str, float] | None = None
+        self._copied: tuple[dict[str, float], dict[str, float]] | None = None
         self._longest = _LENGTHS  # s that the time line was long
         self._posed: tuple[float, GeneralizedPosition] | None = None  # and the time of that
         self.preview = Preview(character, document.file)
@@ -209,22 +210,25 @@ class Session:
             self.take_pose(mirrored(self.character, self.pose))
             return
         values = mirrored_values(self.character, self.poses, number)
-        self.edit(edits.set_pose(self.layer, number, values))
+        velocity = mirrored_velocity(self.character, self.poses[number].get("velocity") or {})
+        self.edit(edits.set_pose(self.layer, number, values, velocity))
 
     def copy(self) -> None:
         """Remember the key at the present time, or the pose that is seen, for `paste`."""
         number, joints = self.key, self.character.layout.joint_names
-        pose = self.pose
+        pose, velocity = self.pose, dict[str, float]()
         if number is not None and not self.is_posed:
+            velocity = self.poses[number].get("velocity") or {}
             joints = joints_of(self.character, self.poses[number]["pose"])
             pose = whole_poses(self.character, self.poses)[number]
-        self._copied = values_of(self.character, pose, joints)
+        self._copied = values_of(self.character, pose, joints), velocity
 
     def paste(self) -> None:
         """Have what was copied as a key at the present time. Raises MotionError if nothing was."""
         if self._copied is None:
             raise MotionError("nothing was copied; copy a key first")
-        self.edit(edits.add_pose(self.layer, self.time, self._copied))
+        values, velocity = self._copied
+        self.edit(edits.add_pose(self.layer, self.time, values, velocity=velocity))
 
     def add_layer(self, name: str) -> None:
         """Add a layer above all others, and be in it."""

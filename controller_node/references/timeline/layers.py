@@ -86,8 +86,8 @@ def layer_of_poses(character: Character, beneath: Reference, layer: Layer) -> La
     driven, rows = _driven(layout, layer), _rows(character, layer)
     times = np.array([pose.at for pose in layer.poses])
     knots = Knots(times, layout.configuration(rows))
-    if len(times) > 1:
-        velocities = _velocities(layout, layer, driven)
+    velocities = _velocities(layout, layer, driven)
+    if len(times) > 1 or velocities is not None:
         knots = smooth_knots(layout, times, knots.configurations, velocities, loops=False)
         rests = [pose.ease is Ease.REST for pose in layer.poses]
         for rates in (knots.velocities, knots.accelerations):

@@ -41,7 +41,9 @@ EDITS: st.SearchStrategy[Edit] = st.one_of(
     st.builds(edits.move_pose, ROWS, ROWS, TIMES),
     st.builds(edits.copy_pose, ROWS, ROWS, TIMES),
     st.builds(edits.delete_pose, ROWS, ROWS),
+    st.builds(edits.add_pose, ROWS, TIMES, POSES, st.none(), POSES),
     st.builds(edits.set_pose, ROWS, ROWS, POSES),
+    st.builds(edits.set_pose, ROWS, ROWS, POSES, POSES),
     st.builds(edits.set_pose_value, ROWS, ROWS, NAMES, NUMBERS),
     st.builds(edits.set_ease, ROWS, ROWS, st.just("rest")),
     st.builds(
@@ -80,6 +82,7 @@ def test_undoing_everything_gives_the_file_of_before(
         assert file.read_bytes() == document.text.encode()
         assert timeline.parse(file, document.text) == document.content
         assert_in_order(document.content)
+        assert_no_rest_with_a_velocity(document.content)
         assert Document(file).content == document.content  # as after a kill
     newest = document.text
     undone = 0
@@ -97,6 +100,32 @@ def assert_in_order(content: timeline.Content) -> None:
     for each in lists:
         times = [item["at"] for item in each]
         assert times == sorted(times)
+
+
+def assert_no_rest_with_a_velocity(content: timeline.Content) -> None:
+    for layer in content.get("keys") or []:
+        for pose in layer["poses"]:
+            assert "velocity" not in pose or pose.get("ease") != "rest"
+
+
+def test_a_velocity_stays_with_its_pose_until_it_is_to_rest_there(tmp_path: Path) -> None:
+    document = Document(tmp_path / "a.yaml", "character: humanoid\n")
+    elbow = {"right_elbow": 0.4}
+    for edit in (
+        edits.add_pose(0, 1.0, elbow, velocity={"right_elbow": -2.0}),
+        edits.copy_pose(0, 0, 2.0),
+        edits.move_pose(0, 1, 3.0),
+        edits.add_pose(0, 3.0, {"right_elbow": 0.5}),
+        edits.set_pose_value(0, 1, "right_elbow", 0.6),
+        edits.set_ease(0, 0, "rest"),
+    ):
+        assert document.apply(edit)
+
+    first, second = document.content["keys"][0]["poses"]
+    assert first == {"at": 1.0, "pose": elbow, "ease": "rest"}
+    assert second == {"at": 3.0, "pose": {"right_elbow": 0.6}, "velocity": {"right_elbow": -2.0}}
+    assert document.apply(edits.set_pose(0, 1, elbow, velocity={}))
+    assert "velocity" not in document.content["keys"][0]["poses"][1]
 
 
 def test_a_new_file_is_there_from_the_first_edit_on(tmp_path: Path) -> None:

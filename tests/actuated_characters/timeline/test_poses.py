@@ -6,9 +6,12 @@ import pytest
 from actuated_characters.timeline.poses import (
     mirrored,
     mirrored_values,
+    mirrored_velocity,
     values_of,
     whole_poses,
 )
+from msgs_config.character.layout import GeneralizedPosition
+from msgs_config.geometry import rotations
 from tests.support.physics import character, random_state
 
 HUMANOID = character("humanoid")
@@ -42,3 +45,23 @@ def test_mirrored_twice_is_the_same_and_once_the_other_side() -> None:
     assert mirrored_values(HUMANOID, [{"at": 0.0, "pose": {"right_elbow": 0.7}}], 0) == {
         "left_elbow": pytest.approx(0.7)
     }
+
+
+def test_a_mirrored_velocity_is_how_the_mirror_image_moves() -> None:
+    layout, step = HUMANOID.layout, 1e-5  # s
+    position, _ = random_state(HUMANOID, np.random.default_rng(1))
+    pose = layout.configuration(0.5 * np.clip(position, *HUMANOID.position_bounds()))
+    velocity = np.random.default_rng(2).uniform(-1.0, 1.0, layout.size)
+    turns = step * velocity[layout.rotation_entries]
+    moved = GeneralizedPosition(
+        pose.position + step * velocity,
+        rotations.multiply(pose.orientations_xyzw, rotations.exp(turns)),
+    )
+
+    way = layout.difference(mirrored(HUMANOID, pose), mirrored(HUMANOID, moved)) / step
+    named = dict(zip(layout.dof_names, velocity.tolist(), strict=True))
+    image = mirrored_velocity(HUMANOID, {**named, "tail": 1.0})
+
+    assert list(image) == list(layout.dof_names)
+    assert list(image.values()) == pytest.approx(way, abs=1e-6)
+    assert mirrored_velocity(HUMANOID, {"right_elbow": 0.7}) == {"left_elbow": pytest.approx(0.7)}

@@ -9,8 +9,10 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
 
 from controller_node.references.base import ReferenceState
+from controller_node.references.curve import REST_TIME
 from controller_node.references.files.keyframes import Keyframes, read_keyframes
 from controller_node.references.keyframes import KeyframesReference, overshoots
 from msgs_config.arrays import FloatArray
@@ -160,6 +162,83 @@ def test_a_parabola_is_followed_exactly_between_inner_keyframes() -> None:
         np.testing.assert_allclose(state.configuration.position, expected, atol=1e-12)
         np.testing.assert_allclose(state.velocity, slope + 2.0 * half * time, atol=1e-12)
         np.testing.assert_allclose(state.acceleration, 2.0 * half, atol=1e-11)
+
+
+@both_ends
+@every_moved
+def test_it_has_its_own_velocity_and_stays_continuous(name: str, period: float | None) -> None:
+    whole, layout = loaded(name)
+    velocities = random_knots(whole, TIMES).velocities
+    assert velocities is not None
+    given = velocities.copy()
+    given[1], given[3, layout.joints[-1].entries] = np.nan, np.nan
+    reference, automatic = (
+        KeyframesReference(layout, replace(random_keyframes(whole, True, period), velocities=each))
+        for each in (given, None)
+    )
+
+    times = TIMES.tolist() if period is None else [*TIMES, *(TIMES + PERIOD)]
+    for time in times:
+        before, after = reference.sample(time - INSTANT), reference.sample(time + INSTANT)
+        assert_same_motion(layout, before, after, atol=1e-4)
+    for row, own in zip([*given, *given], times, strict=False):
+        expected = np.where(np.isnan(row), automatic.sample(own).velocity, row)
+        np.testing.assert_allclose(reference.sample(own).velocity, expected, atol=1e-9)
+    inside = np.random.default_rng(4).uniform(0.25, 3.0, 30)
+    inside = inside[np.abs(inside[:, np.newaxis] - TIMES).min(axis=1) > 1e-3]
+    assert_moves_as_it_says(layout, reference.sample, inside.tolist())
+
+
+@both_ends
+@every_moved
+def test_without_a_velocity_of_its_own_not_a_bit_changes(name: str, period: float | None) -> None:
+    whole, layout = loaded(name)
+    keyframes = random_keyframes(whole, True, period)
+    none = np.full((len(TIMES), layout.size), np.nan)
+    one, other = (
+        KeyframesReference(layout, each)
+        for each in (keyframes, replace(keyframes, velocities=none))
+    )
+
+    for time in np.linspace(0.0, 5.0, 101).tolist():
+        ours, theirs = one.sample(time), other.sample(time)
+        np.testing.assert_array_equal(ours.configuration.position, theirs.configuration.position)
+        np.testing.assert_array_equal(ours.velocity, theirs.velocity)
+        np.testing.assert_array_equal(ours.acceleration, theirs.acceleration)
+
+
+def test_a_cubic_with_its_velocities_is_followed_exactly_between_inner_keyframes() -> None:
+    layout = PANDA.layout
+    cubic = Polynomial([0.1, 0.3, -0.2, 0.05])
+
+    def columns(values: FloatArray) -> FloatArray:
+        return np.tile(values[:, np.newaxis], (1, layout.size))
+
+    configurations = layout.configuration(columns(cubic(TIMES)))
+    keyframes = Keyframes(TIMES, configurations, True, None, columns(cubic.deriv()(TIMES)))
+    reference = KeyframesReference(layout, keyframes)
+
+    for time in np.linspace(TIMES[1], TIMES[-2], 9).tolist():
+        state = reference.sample(time)
+        np.testing.assert_allclose(state.configuration.position, cubic(time), atol=1e-12)
+        np.testing.assert_allclose(state.velocity, cubic.deriv()(time), atol=1e-12)
+        np.testing.assert_allclose(state.acceleration, cubic.deriv(2)(time), atol=1e-11)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_keyframe_that_moves_at_an_end_comes_from_rest_and_to_rest(
+    tmp_path: Path, count: int
+) -> None:
+    frames = [{**at(1.0 + n), "velocity": {"panda_joint1": 0.4}} for n in range(count)]
+    keyframes = read(tmp_path, *frames)
+    reference = KeyframesReference(PANDA.layout, keyframes)
+    last = float(count)
+
+    assert reference.sample(1.0).velocity[0] == pytest.approx(0.4)
+    assert reference.sample(last - INSTANT).velocity[0] == pytest.approx(0.4, abs=1e-6)
+    for time in (1.0 - REST_TIME - INSTANT, last + REST_TIME + INSTANT):
+        resting = still_at(PANDA.layout, keyframes, 0)
+        assert_same_motion(PANDA.layout, reference.sample(time), resting, atol=1e-5)
 
 
 def test_a_steady_turn_is_followed_exactly_between_inner_keyframes() -> None:
@@ -343,6 +422,19 @@ REFUSED: dict[str, tuple[object, list[str]]] = {
     "infinite": ({"keyframes": [at(0.0, panda_joint1=float("inf"))]}, ["panda_joint1 is inf"]),
     "huge": ({"keyframes": [at(0.0, panda_joint1=10**300)]}, ["panda_joint1", "number"]),
     "null": ({"keyframes": [at(0.0, panda_joint1=None)]}, ["panda_joint1 is missing"]),
+    "velocity type": ({"keyframes": [{**GOOD, "velocity": 3}]}, ["keyframe 1: velocity is 3"]),
+    "velocity unknown": (
+        {"keyframes": [{**GOOD, "velocity": {"panda_joint11": 1.0}}]},
+        ["keyframe 1: velocity", "'panda_joint11'"],
+    ),
+    "velocity value": (
+        {"keyframes": [{**GOOD, "velocity": {"panda_joint1": "fast"}}]},
+        ["keyframe 1: velocity.panda_joint1 is 'fast'", "number"],
+    ),
+    "velocity linear": (
+        {"keyframes": [{**GOOD, "velocity": {"panda_joint1": 1}}], "interpolation": "linear"},
+        ["velocity is for 'interpolation: smooth'"],
+    ),
     "beyond limits": (
         {"keyframes": [at(0.0), at(1.0, panda_joint1=3.5)]},
         ["keyframe 2: pose.panda_joint1 is 3.5", "limits", "rad"],
@@ -375,6 +467,14 @@ def test_a_rotation_vector_in_parts_is_refused(tmp_path: Path) -> None:
             read(tmp_path, at(0.0), at(1.0, **pose), whole=HUMANOID)
 
 
+def test_a_velocity_of_a_rotation_in_parts_is_refused(tmp_path: Path) -> None:
+    frame = {**at(0.0), "velocity": {"chest_x": 0.1}}
+    with pytest.raises(MotionError, match=r"keyframe 1: velocity: .*chest_y") as caught:
+        read(tmp_path, frame, whole=HUMANOID)
+
+    assert "\n" not in str(caught.value)
+
+
 def test_a_rest_pose_beyond_limits_is_not_the_files_fault(tmp_path: Path) -> None:
     # a URDF alone has its rest pose at zero, wherever the limits are
     lower, upper = PANDA.position_bounds()
@@ -391,7 +491,10 @@ SCALARS = st.one_of(
 )
 POSES = st.one_of(SCALARS, st.dictionaries(st.sampled_from([*JOINTS, "no"]), SCALARS, max_size=3))
 FRAMES = st.one_of(
-    SCALARS, st.fixed_dictionaries({}, optional={"time": SCALARS, "pose": POSES, "x": SCALARS})
+    SCALARS,
+    st.fixed_dictionaries(
+        {}, optional={"time": SCALARS, "pose": POSES, "velocity": POSES, "x": SCALARS}
+    ),
 )
 FILES = st.fixed_dictionaries(
     {"keyframes": st.one_of(SCALARS, st.lists(FRAMES, max_size=4))},

@@ -21,7 +21,10 @@ WHOLE: dict[str, Any] = {
             "name": "wave",
             "in": 0.1,
             "out": "never",
-            "poses": [POSE, {**POSE, "at": 2, "ease": "rest"}],
+            "poses": [
+                {**POSE, "velocity": {"right_elbow": -1.5}},
+                {**POSE, "at": 2, "ease": "rest"},
+            ],
         }
     ],
     "clips": [
@@ -60,6 +63,7 @@ def test_each_key_is_read(tmp_path: Path) -> None:
     assert (layer.come, layer.go) == (0.1, None)
     assert [pose.at for pose in layer.poses] == [1.0, 2.0]
     assert [pose.ease for pose in layer.poses] == [Ease.SMOOTH, Ease.REST]
+    assert [pose.velocity for pose in layer.poses] == [{"right_elbow": -1.5}, {}]
     walk, kick = timeline.clips  # by their times
     assert (walk.clip, walk.begin, walk.end, walk.blend) == ("walk", 0.1, None, 0.3)
     assert (walk.position, walk.heading) == (None, None)
@@ -99,6 +103,18 @@ def test_an_empty_timeline_is_one(tmp_path: Path) -> None:
         (
             {"keys": [{"poses": [{"at": 1, "pose": {"neck": "a"}}]}]},
             "poses 1: pose.neck is 'a'; it must be a finite number",
+        ),
+        (
+            {"keys": [{"poses": [{**POSE, "velocity": {"right_elbow": "a"}}]}]},
+            "poses 1: velocity.right_elbow is 'a'; it must be a finite number",
+        ),
+        (
+            {"keys": [{"poses": [{**POSE, "velocity": 3}]}]},
+            "poses 1: velocity is 3; it must be a mapping",
+        ),
+        (
+            {"keys": [{"poses": [{**POSE, "ease": "rest", "velocity": {"right_elbow": 1}}]}]},
+            "poses 1: a pose has a velocity or 'ease: rest', not both; remove one",
         ),
         ({"keys": [{"out": "ever", "poses": [POSE]}]}, "keys 1: out is 'ever'; it must be"),
         ({"keys": [{"in": -1, "poses": [POSE]}]}, "keys 1: in is -1; it must be"),

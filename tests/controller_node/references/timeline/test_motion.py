@@ -41,6 +41,7 @@ WAVE["poses"][0]["pose"]["neck_z"] = 0.2  # type: ignore[index]
 ELBOW = LAYOUT.dof_names.index("right_elbow")
 NECK = [LAYOUT.dof_names.index(f"neck_{axis}") for axis in "xyz"]
 SLOW = {"at": 0.5, "until": 3.0, "velocity": [0.1, 0.0, 0.0]}
+STILL = {"at": 0, "pose": {"right_elbow": 0.5}}
 WALK = {"at": 0.5, "clip": "walk", "from": 0.2}
 
 
@@ -114,6 +115,22 @@ def test_a_pose_to_rest_in_is_come_to_at_rest(tmp_path: Path) -> None:
     assert smooth.sample(1.5).velocity[ELBOW] == pytest.approx(0.5, abs=1e-12)  # the line's slope
     for reference in (resting, smooth):
         assert reference.sample(1.5).configuration.position[ELBOW] == pytest.approx(0.75)
+
+
+def test_a_pose_is_passed_with_its_velocity(tmp_path: Path) -> None:
+    poses = [dict(pose) for pose in WAVE["poses"]]  # type: ignore[attr-defined]
+    poses[1]["velocity"] = {"right_elbow": -3.0, "neck_x": 0.2, "neck_y": 0.0, "neck_z": 0.4}
+    poses[2]["velocity"] = {"right_elbow": 1.0}
+    reference = made(tmp_path, keys=[{**WAVE, "poses": poses}])
+
+    state = reference.sample(1.5)
+    assert state.configuration.position[ELBOW] == pytest.approx(1.4)
+    assert state.velocity[ELBOW] == pytest.approx(-3.0)
+    assert state.velocity[NECK] == pytest.approx((0.2, 0.0, 0.4))
+    assert reference.sample(2.0 - 1e-9).velocity[ELBOW] == pytest.approx(1.0, abs=1e-6)
+    for time in (0.6, 1.0, 1.5, 2.0, 2.3, 2.5):
+        before, after = reference.sample(time - 1e-9), reference.sample(time + 1e-9)
+        assert_same_motion(LAYOUT, before, after, atol=1e-5)
 
 
 def test_a_layer_from_the_beginning_is_there_at_once_and_one_that_never_goes_stays(
@@ -345,6 +362,16 @@ def test_states_are_the_same_however_often_and_in_which_order_they_are_asked_for
             "humanoid",
             {"keys": [{"poses": [{"at": 0, "pose": {"elbow": 0.1}}]}]},
             "keys 1: poses 1: pose: .*'elbow'",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{**STILL, "velocity": {"left_elbow": 1}}]}]},
+            "keys 1: poses 1: velocity: no pose of the layer has 'left_elbow'",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{**STILL, "velocity": {"neck_x": 1}}]}]},
+            "keys 1: poses 1: velocity: .*neck_y",
         ),
         (
             "humanoid",

@@ -43,8 +43,13 @@ def layers(draw: st.DrawFn) -> dict[str, Any]:
     poses, at = [], draw(TIMES)
     kinds = st.one_of(NECK, ELBOW, ROOT)
     for _ in range(draw(st.integers(1, 4))):
-        ease = draw(st.sampled_from(["smooth", "rest"]))
-        poses.append({"at": at, "pose": draw(kinds), "ease": ease})
+        ease = draw(st.sampled_from(["smooth", "rest", "velocity"]))
+        pose = draw(kinds)
+        if ease == "velocity":
+            velocity = {name: draw(st.floats(-20.0, 20.0)) for name in pose}
+            poses.append({"at": at, "pose": pose, "velocity": velocity})
+        else:
+            poses.append({"at": at, "pose": pose, "ease": ease})
         at += draw(LENGTHS)
     out = draw(st.one_of(SHARES, st.just("never")))
     return {"in": draw(SHARES), "out": out, "poses": poses}
