@@ -136,7 +136,7 @@ def _facts(keyed: "KeyedClip") -> Iterator[tuple[str, str]]:
     if keyframes.period is not None:
         yield "path", f"a loop of {keyframes.period:.3g} s"
     else:
-        yield "path", "at rest at both ends"
+        yield "path", "ends with the clip"
 
 
 def _described(deviation: "Deviation | None", factor: float, unit: str) -> str:
