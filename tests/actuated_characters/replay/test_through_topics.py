@@ -226,8 +226,9 @@ def test_changed_gains_laws_and_trajectories_come_again(eventful: Path) -> None:
     changes = parameter_changes(recording)
     assert sum(map(len, changes.values())) == 5
     rare = read_rare_messages(eventful, recording)
-    steering = CMD_VEL_STAMPED.name  # to which only a steered reference listens
-    assert rare.requested == {topic.name for topic in REQUESTS} - {steering}
+    # Only a steered reference and a behaviour that reacts listen to these.
+    unheard = {CMD_VEL_STAMPED.name, topics.BEHAVIOUR.of(topics.CONTROLLER_NODE).name}
+    assert rare.requested == {topic.name for topic in REQUESTS} - unheard
     assert sum(map(len, rare.requests.values())) == 4
 
     comparison = by_states(eventful)
