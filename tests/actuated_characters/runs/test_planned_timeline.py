@@ -19,7 +19,7 @@ from actuated_characters.runs.planned.behaviours import read_behaviours
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.strengths import read_strengths
 from actuated_characters.runs.planned.timeline import plan_timeline
-from controller_node.planner.settings import PlannerParameters
+from controller_node.planner.settings import PlannerParameters, make_planner_settings
 from controller_node.references.posture import Posture
 from controller_node.references.timeline.file import shipped_timelines
 from msgs_config.errors import ActuatedCharactersError
@@ -117,6 +117,19 @@ def test_without_a_word_a_character_is_planned_for_and_what_is_said_counts(tmp_p
     assert given.plan.simulation.rate_hz == 500
     other = planned(tmp_path, {"run": ASSISTED}, "--set", "sim_node.friction:=0.5")
     assert other.plan.simulator["friction"] == 0.5
+
+
+def test_only_what_may_not_fall_is_planned_in_longer_steps(tmp_path: Path) -> None:
+    def step(content: dict[str, Any], *options: str) -> int:
+        plan = planned(tmp_path, content, *options).plan
+        return make_planner_settings(plan.character, plan.controller).step
+
+    assert step({}) == 2  # ticks
+    assert step({"run": {"behaviour": "active_ragdoll"}}) == 1
+    assert step({"behaviours": [{"at": 1.0, "do": "brace"}]}) == 1
+    assert step({}, "--behaviour", "reactive") == 1
+    assert step({"set": {"controller_node.plan.step": 0}}) == 1
+    assert step({}, "--set", "controller_node.plan.step:=0.05") == 12  # all of a period
 
 
 def test_it_lasts_until_all_is_over(tmp_path: Path) -> None:
