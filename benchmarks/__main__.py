@@ -21,6 +21,7 @@ from rich.console import Console  # noqa: E402
 from actuated_characters.runs.ros_domain import own_domain  # noqa: E402
 from benchmarks.control_law import measure_control_laws  # noqa: E402
 from benchmarks.cost import measure_cost  # noqa: E402
+from benchmarks.editing import measure_editing  # noqa: E402
 from benchmarks.engines import measure_engines  # noqa: E402
 from benchmarks.lockstep import measure_lockstep  # noqa: E402
 from benchmarks.planning import measure_planning  # noqa: E402
@@ -40,6 +41,7 @@ _MEASUREMENTS = {
     "cost": measure_cost,
     "engines": measure_engines,
     "planning": measure_planning,
+    "editing": measure_editing,
     "realtime": measure_realtime,
     "reconstruction": measure_reconstruction,
     "recorder": measure_recorder,
