@@ -250,6 +250,18 @@ for _kind, _pattern in _NUMBERS.items():
 _PlainLoader.add_constructor(f"{_TAG}int", lambda _, node: int(node.value))
 
 
+def dump_yaml(content: Any, *, sort_keys: bool = False) -> str:
+    """The YAML text of plain data, as PyYAML writes it; by libyaml where it is there, the same.
+
+    Raises:
+        yaml.YAMLError: it holds something that is no plain data.
+    """
+    return str(yaml.dump(content, Dumper=_PlainDumper, sort_keys=sort_keys))
+
+
+_PlainDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+
 def parse_xml(path: Path, text: str, error: type[ActuatedCharactersError]) -> ElementTree.Element:
     """The root element of an XML file's text, which may end in a NUL as PyBullet's own do.
 

@@ -11,7 +11,6 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeVar
 
-import yaml
 from mcap.writer import CompressionType, Writer
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import dump_qos_v9
@@ -38,6 +37,7 @@ from actuated_characters.bags.format.storage import (
     reason,
 )
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
+from msgs_config.files import dump_yaml
 from msgs_config.messages.topic import Quality
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class BagWriter:
             text = definition.text.encode()
             self._schemas[name] = self._attempt(self._writer.register_schema, name, "ros2msg", text)
         metadata = {
-            OFFERED_QOS: yaml.safe_dump(profiles, sort_keys=False).strip(),
+            OFFERED_QOS: dump_yaml(profiles).strip(),
             TYPE_HASH: definition.type_hash,
         }
         if self._is_simulated:
@@ -215,7 +215,7 @@ class BagWriter:
 
     def _finish(self) -> None:
         content = self._information()
-        text = yaml.safe_dump(content, sort_keys=False)
+        text = dump_yaml(content)
         self._writer.flush()  # the messages come before the metadata
         self._writer.add_metadata("rosbag2", {"serialized_metadata": text})
         self._writer.finish()

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from actuated_characters.bags.directory_lock import is_locked
 from actuated_characters.bags.format.metadata import BAG, EARLIER_BAG
 from actuated_characters.metrics.run_metrics import Series
 from msgs_config.errors import RecordingError, RunError
+from msgs_config.files import dump_yaml
 from msgs_config.whole_files import part_of, write_whole, writing
 
 PARAMETERS, LOGS = "parameters", "logs"
@@ -136,7 +136,7 @@ def write_parameters(
     """
     file = directory / PARAMETERS / f"{name}.yaml"
     content = {node or name: {"ros__parameters": dict(parameters)}}
-    write_whole(file, yaml.safe_dump(content))
+    write_whole(file, dump_yaml(content, sort_keys=True))
     return file
 
 

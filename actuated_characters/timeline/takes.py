@@ -10,8 +10,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from controller_node.references.timeline.file import timeline_path
 from msgs_config import files
 from msgs_config.errors import MotionError, RecordingError, one_of
@@ -126,5 +124,5 @@ def write_copy(timeline: Path, directory: Path) -> Path:
         if beside.is_file() and str(beside) != entry["clip"]:
             entry["clip"], moved = str(beside), True
     copy = directory / TIMELINE
-    write_whole(copy, yaml.safe_dump(content, sort_keys=False) if moved else text)
+    write_whole(copy, files.dump_yaml(content) if moved else text)
     return copy

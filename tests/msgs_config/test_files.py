@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ from controller_node.references.files.keyframes import read_keyframes
 from msgs_config.character.file import read_character_file
 from msgs_config.character.loading import load_character
 from msgs_config.errors import CharacterError, ConfigurationError
-from msgs_config.files import parse_yaml
+from msgs_config.files import dump_yaml, parse_yaml
 from msgs_config.parameters import Parameter, resolve
 from tests.support.urdf import joint, link, robot
 
@@ -136,3 +137,18 @@ def test_a_value_of_set_that_is_no_yaml_is_refused_in_one_line(text: str) -> Non
     with pytest.raises(ConfigurationError, match="not valid YAML") as caught:
         by_set(text)
     assert "\n" not in str(caught.value)
+
+
+_PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(st.characters(codec="ascii")),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=10,
+)
+
+
+@given(st.dictionaries(st.sampled_from(["topics", "duration", "1", "no"]), _PLAIN))
+@settings(max_examples=100, deadline=None)
+def test_yaml_is_written_such_that_others_read_the_same(content: dict[str, object]) -> None:
+    read = yaml.load(dump_yaml(content), Loader=yaml.SafeLoader)
+
+    assert json.dumps(read) == json.dumps(content)

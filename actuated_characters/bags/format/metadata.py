@@ -4,8 +4,6 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
-import yaml
-
 from actuated_characters.bags.format.storage import (
     CDR,
     MCAP,
@@ -78,7 +76,7 @@ def load_metadata(bag: Path) -> Any:
 def write_metadata(bag: Path, content: Mapping[str, Any]) -> None:
     """Write `metadata.yaml`, whole. Raises OSError."""
     scratch = bag / f"{METADATA}.tmp"
-    text = yaml.safe_dump({_TOP_LEVEL_KEY: dict(content)}, sort_keys=False)
+    text = files.dump_yaml({_TOP_LEVEL_KEY: dict(content)})
     scratch.write_text(text, encoding="utf-8")
     scratch.replace(bag / METADATA)
 

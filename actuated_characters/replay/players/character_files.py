@@ -4,8 +4,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import yaml
-
 from msgs_config import files
 from msgs_config.character.file import ALONE
 from msgs_config.character.layout import JointType
@@ -31,7 +29,7 @@ def write_character(directory: Path, character: Character, *, lift_limits: bool 
     if lift_limits:
         content["joints"] = _without_limits(character, content.get("joints") or {})
     file = directory / f"{character.name}.yaml"
-    file.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    file.write_text(files.dump_yaml(content), encoding="utf-8")
     return file
 
 
