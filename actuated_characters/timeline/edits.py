@@ -168,6 +168,21 @@ def event_at(event: Mapping[str, Any], at: float) -> dict[str, Any]:
     return moved
 
 
+def event_until(event: Mapping[str, Any], end: float) -> dict[str, Any]:
+    """An event that ends at another time in s; of a clip, which has none, that is where it is cut.
+
+    Raises:
+        MotionError: it would end before it begins.
+    """
+    lasts = rounded(_time(end) - event["at"])
+    if lasts < SHORTEST_TIME:
+        raise MotionError(f"it begins at {event['at']:g} s, and must end later than that")
+    if "clip" not in event:
+        return {**event, "until": _time(end)}
+    begin = event["from"] if is_number(event.get("from")) else 0.0
+    return {**event, "to": rounded(begin + lasts)}
+
+
 def replace_event(track: str, number: int, event: Mapping[str, Any]) -> Edit:
     """Have another event in the place of one."""
 

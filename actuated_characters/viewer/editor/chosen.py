@@ -60,6 +60,17 @@ class Chosen:
         else:
             self._replace(item, edits.event_at(self._find(item), at))
 
+    def end(self, item: Item, at: float) -> None:
+        """Have an event end at another time in s, and choose it.
+
+        Raises:
+            MotionError: it has no end, or would have it before it begins.
+        """
+        if not item.lasts:
+            raise MotionError(f"{item.track} have no end that could be moved")
+        self.choose(item)
+        self._replace(item, edits.event_until(self._find(item), at))
+
     def mirror(self) -> None:
         """Exchange left and right of what is chosen. Raises as `mirrored_event`, `Session`."""
         item = self.event

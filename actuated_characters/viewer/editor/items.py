@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from actuated_characters.timeline.content import KEYS, TRACKS
 from msgs_config.errors import MotionError
 
+_MOMENTS = (KEYS, "pushes", "throws")
 _FORM = re.compile(rf"({KEYS})/(\d{{1,6}})/(\d{{1,6}})|({'|'.join(TRACKS)})/(\d{{1,6}})")
 
 
@@ -21,6 +22,11 @@ class Item:
     def is_key(self) -> bool:
         """Whether it is a key."""
         return self.track == KEYS
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it has an end: no key, push or throw has."""
+        return self.track not in _MOMENTS
 
     def __str__(self) -> str:
         """What pages call it."""

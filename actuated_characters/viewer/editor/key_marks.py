@@ -27,21 +27,21 @@ def find_key_marks(content: Content, length: float) -> list[Mark]:
     marks = [Mark(END, length, length, "the end")]
     for layer, each in enumerate(content.get(KEYS, [])):
         for number, pose in enumerate(each["poses"]):
-            at, item = float(pose["at"]), str(Item(KEYS, number, layer))
+            at, key = float(pose["at"]), str(Item(KEYS, number, layer))
             text = _describe_key(layer, each, pose)
-            marks.append(Mark(KEYFRAME, at, at, text, lane=layer, item=item))
+            marks.append(Mark(KEYFRAME, at, at, text, lane=layer, item=key))
     lanes: list[tuple[str, float]] = []  # the track of each row, and when its last event ends, s
     for track in TRACKS:
         for number, event in enumerate(content.get(track, [])):
             start, text = float(event["at"]), describe_event(track, number, event)
-            item = str(Item(track, number))
-            if track in _KINDS:
-                marks.append(Mark(_KINDS[track], start, start, text, item=item))
+            item = Item(track, number)
+            if not item.lasts:
+                marks.append(Mark(_KINDS[track], start, start, text, item=str(item)))
                 continue
             end = _end_of(event)
             lane = _free_lane(lanes, track, start)
             lanes[lane] = (track, end)
-            marks.append(Mark(_SPAN, start, end, text, track, _COLORS[track], lane, item))
+            marks.append(Mark(_SPAN, start, end, text, track, _COLORS[track], lane, str(item)))
     return sorted(marks, key=lambda mark: mark.start)
 
 

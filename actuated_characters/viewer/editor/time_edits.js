@@ -1,6 +1,7 @@
 // Keys and events that are dragged along the time line, and the keyboard; time_edits.py hears of it.
 (() => {
   const SLOP = 3, AWAY = 60; // pixels: no drag yet; beside the time line, from where a drag is none
+  const EDGE = 6; // pixels at the end of what lasts, by which its end is dragged
   const ACTS = { c: "copy", v: "paste", z: "undo", y: "redo" }; // with Ctrl
   const line = window.timeLine, { bar, track } = line;
   let held = null, asked = ""; // what is dragged; what was chosen, of which the page is not yet told
@@ -8,9 +9,18 @@
 
   const send = (act, ...values) =>
     line.update(line.told.edits, JSON.stringify([count++, line.told.document, act, ...values]));
-  const startOf = item => line.told.marks.find(each => each.item === item).start;
+  const markOf = item => line.told.marks.find(each => each.item === item);
+  const isAtEnd = (part, event) => { // of what is long enough to be moved as well
+    const box = part.getBoundingClientRect();
+    return part.classList.contains("mode") && box.width > 2 * EDGE
+      && event.clientX > box.right - EDGE;
+  };
 
-  function place(at) { held.part.style.left = line.percent(at); }
+  function place(at) { // where what is dragged begins, or ends
+    const { style } = held.part;
+    if (held.act === "move") style.left = line.percent(at);
+    else style.width = `calc(${line.percent(at)} - ${style.left})`;
+  }
   function letGo() {
     place(held.start);
     held.part.classList.remove("held");
@@ -26,7 +36,7 @@
     const at = held.start + way / box.width * (told.last - told.first);
     const snapped = Math.round(at / told.step) * told.step;
     const isAway = event.clientY < box.top - AWAY || event.clientY > box.bottom + AWAY;
-    held.at = isAway ? held.start : Math.min(Math.max(snapped, told.first), told.last);
+    held.at = isAway ? held.start : Math.min(Math.max(snapped, held.least), told.last);
     place(held.at);
     line.say(held.at, isAway ? ["stays"] : []);
   }
@@ -42,11 +52,15 @@
     own(event);
     document.activeElement?.blur(); // or a field of the panel would keep the keys
     track.setPointerCapture(event.pointerId);
-    const { item } = part.dataset, start = startOf(item);
-    held = { part, item, start, at: start, from: event.clientX, moved: false,
+    const { item } = part.dataset, { start: begin, end } = markOf(item), { first, step } = line.told;
+    const [act, start, least] = isAtEnd(part, event) ? ["end", end, begin + step]
+      : ["move", begin, first];
+    held = { part, item, act, start, least, at: start, from: event.clientX, moved: false,
       document: line.told.document };
   }, true);
   track.addEventListener("pointermove", event => {
+    const part = event.target.closest?.("[data-item].mode");
+    if (!held) part?.classList.toggle("end", isAtEnd(part, event));
     if (!held) return;
     own(event);
     follow(event);
@@ -55,14 +69,13 @@
     if (!held) return;
     own(event);
     follow(event);
-    const { item, start, at, moved, part } = held;
-    held = null;
+    const { item, act, start, at, moved, part } = held;
     if (Math.abs(at - start) > 1e-9) { // it stays there until the marks come anew
-      send("move", item, at);
+      held = null;
+      send(act, item, at);
       return;
     }
-    part.style.left = line.percent(start);
-    part.classList.remove("held");
+    letGo();
     if (moved) return;
     send("choose", asked = item);
     line.seek(part.classList.contains("mode") ? line.timeOf(event) : start);
@@ -97,7 +110,7 @@
     for (const part of track.querySelectorAll("[data-item]")) {
       const { item } = part.dataset, isKey = item.startsWith("keys/");
       const isHere = isKey && !told.chosen && item.startsWith(`keys/${told.layer}/`)
-        && Math.abs(startOf(item) - time) < 5e-4;
+        && Math.abs(markOf(item).start - time) < 5e-4;
       part.classList.toggle("chosen", isHere || item === told.chosen);
     }
   }

@@ -17,7 +17,7 @@ from actuated_characters.timeline.content import is_number
 from actuated_characters.timeline.edits import rounded
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.editor.chosen import Chosen
-from actuated_characters.viewer.editor.items import parse_item
+from actuated_characters.viewer.editor.items import Item, parse_item
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.recorded.playback_controls import on
 from actuated_characters.viewer.recorded.time_bar import TimeBar
@@ -53,6 +53,10 @@ class TimeEdits:
             "undo": session.undo,
             "redo": session.redo,
         }
+        self._drags: dict[object, Callable[[Item, float], object]] = {
+            "move": chosen.move,
+            "end": chosen.end,
+        }
         field: Any = gui.add_text("Time line", "", visible=False)
         on(actions, field, lambda text: act(partial(self._do, text)))
         bar.add_files(_FILES)
@@ -73,8 +77,8 @@ class TimeEdits:
         item = parse_item(str(values[0])) if values[0] else None
         if act == "choose":
             self._chosen.choose(item)
-        elif act == "move" and item is not None and is_number(at := values[-1]):
-            self._chosen.move(item, rounded(round(at / STEP) * STEP))
+        elif act in self._drags and item is not None and is_number(at := values[-1]):
+            self._drags[act](item, rounded(round(at / STEP) * STEP))
         else:
             raise MotionError("the time line was not understood")
 

@@ -59,6 +59,22 @@ def test_the_end_of_an_event_moves_along(session: Session, chosen: Chosen) -> No
     assert content(session)["limp"] == [{"at": 2.25, "until": 2.75}]
 
 
+def test_an_event_ends_at_another_time_and_a_clip_is_cut_there(
+    session: Session, chosen: Chosen
+) -> None:
+    session.edit(edits.add_event("clips", {"at": 5.0, "clip": "walk", "from": 0.5}))
+
+    chosen.end(Item("limp", 0), 2.25)
+    chosen.end(Item("clips", 0), 5.6)
+
+    begin = LIMP["at"]
+    assert content(session)["limp"] == [{"at": begin, "until": 2.25}]
+    assert content(session)["clips"] == [{"at": 5.0, "clip": "walk", "from": 0.5, "to": 1.1}]
+    assert chosen.event == Item("clips", 0)
+    with pytest.raises(MotionError, match=f"it begins at {begin:g} s, and must end later than"):
+        chosen.end(Item("limp", 0), begin)
+
+
 def test_a_key_that_is_moved_is_gone_to_in_its_layer(session: Session, chosen: Chosen) -> None:
     session.add_layer("head")
     chosen.move(Item("keys", 0, 0), 2.0)

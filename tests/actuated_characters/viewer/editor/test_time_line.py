@@ -36,9 +36,15 @@ def browser(tmp_path: Path) -> Iterator[Browser]:
         yield browser
 
 
-def drag(browser: Browser, part: str, seconds: float, *, down: float = 0.0) -> tuple[float, float]:
-    """Hold a part of the time line, and move it; returns where the mouse is then."""
+def drag(
+    browser: Browser, part: str, seconds: float, *, down: float = 0.0, aside: float = 0.0
+) -> tuple[float, float]:
+    """Hold a part of the time line, pixels aside of its middle, and move it.
+
+    Returns where the mouse is then.
+    """
     x, y = place_of(browser, part)
+    x += aside
     browser.press(x, y)
     way = seconds * browser.evaluate(WIDTH)
     for step in range(1, 6):
@@ -59,6 +65,7 @@ def test_keys_and_events_are_dragged_chosen_and_edited_by_the_keyboard(
     check_that_a_drag_that_is_given_up_moves_nothing(browser, file)
     check_that_a_drag_is_one_step_that_can_be_undone(browser, file)
     check_that_a_key_is_dragged(browser, file)
+    check_that_an_end_is_dragged(browser, file)
     check_that_what_is_chosen_is_copied_and_deleted(browser, file)
     check_that_a_field_keeps_its_keys(browser, file)
     assert not browser.console
@@ -81,6 +88,11 @@ def until_marked(browser: Browser, count: int) -> None:
     """Wait for so many marks of the track `limp`: before, the page knows of the last edit not."""
     shown = "document.querySelectorAll('[data-item^=limp]').length"
     wait_until(lambda: browser.evaluate(shown) == count, f"{count} marks", SOON)
+
+
+def until_drawn_anew(browser: Browser) -> None:
+    held = "document.querySelectorAll('#time-line .held').length"
+    wait_until(lambda: browser.evaluate(held) == 0, "the marks after a drag", SOON)
 
 
 def check_that_a_click_goes_to_the_nearest_time(browser: Browser) -> None:
@@ -132,6 +144,25 @@ def check_that_a_key_is_dragged(browser: Browser, file: Path) -> None:
     assert "key 1 of 1" in text_of(browser)
     assert Document(file).content["keys"][0]["poses"][0]["at"] == 1.5
     until_shown_as_chosen(browser, KEY)
+
+
+def check_that_an_end_is_dragged(browser: Browser, file: Path) -> None:
+    shown = f"document.querySelector('{LIMP}').getBoundingClientRect()"
+    half = browser.evaluate(f"{shown}.width / 2")
+    left = place_of(browser, LIMP)[0] - half
+    for way, end in ((0.3, 3.8), (-3.0, 3.02)):  # no less than a step after it begins
+        browser.mouse("mouseReleased", *drag(browser, LIMP, way, aside=half - 3.0))
+        until(file, lambda: Document(file).content["limp"], [{"at": 3.0, "until": end}])
+        until_drawn_anew(browser)
+        box = browser.evaluate(f"(({{x, width}}) => [x, width])({shown})")
+        assert box == pytest.approx([left, browser.evaluate(WIDTH) * (end - 3.0)], abs=2.0)
+        half = box[1] / 2
+    tap(browser, "z", keys=CONTROL)
+    until(file, lambda: Document(file).content["limp"], [{"at": 3.0, "until": 3.8}])
+    tap(browser, "z", keys=CONTROL)
+    until(file, lambda: Document(file).content["limp"], [{"at": 3.0, "until": 3.5}])
+    least = 0.4 * browser.evaluate(WIDTH)
+    wait_until(lambda: browser.evaluate(f"{shown}.width") > least, "its mark as before", SOON)
 
 
 def check_that_what_is_chosen_is_copied_and_deleted(browser: Browser, file: Path) -> None:
