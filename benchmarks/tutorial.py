@@ -190,6 +190,7 @@ def simulate(hands: Hands, title: str, number: int) -> float:
 def add_events(hands: Hands) -> None:
     """Steps, then a hit by which it goes limp."""
     hands.choose("Seen", "none")
+    hands.type("Duration (s)", "12")
     hands.unfold("Events")
     hands.go_to(2.4)
     hands.choose("New", "steering")
@@ -203,7 +204,6 @@ def add_events(hands: Hands) -> None:
     hands.choose("New", "limp")
     hands.type("lasts (s)", "0.6")
     hands.click("Add event")
-    hands.type("Duration (s)", "9")
     hands.picture("events")
 
 

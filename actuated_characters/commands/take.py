@@ -107,8 +107,8 @@ def _report(planned: "PlannedTake", take: "Take", wall_time: float) -> None:
         print(f"take {take.name}: {take.until:g} s from the beginning, in {wall_time:.1f} s")
     else:
         print(
-            f"take {take.name}, of take {take.parent}: the same up to {take.since:.3f} s; "
-            f"simulated from {take.begin:g} to {take.until:g} s, in {wall_time:.1f} s"
+            f"take {take.name}, of take {take.parent}: the same up to {take.since:.3f} s, "
+            f"simulated from the keyframe at {take.begin:g} s on, in {wall_time:.1f} s"
         )
     summary = read_metrics(take.directory)[0]
     if summary.get("fell"):

@@ -45,6 +45,11 @@ class Chosen:
         else:
             self._chosen = (item.track, self._find(item))
 
+    def add(self, track: str, event: Mapping[str, Any]) -> None:
+        """Add an event to a track, and choose it. Raises as `Session.edit`."""
+        self._session.edit(edits.add_event(track, event))
+        self._chosen = (track, event)
+
     def move(self, item: Item, at: float) -> None:
         """Move a key to another time in s, and go there; or an event, and choose it.
 
@@ -95,9 +100,7 @@ class Chosen:
             session.paste()
             return
         track, copied = self._copied
-        pasted = edits.event_at(copied, session.time)
-        session.edit(edits.add_event(track, pasted))
-        self._chosen = (track, pasted)
+        self.add(track, edits.event_at(copied, session.time))
 
     def delete(self) -> None:
         """Delete what is chosen. Raises MotionError if that is nothing."""

@@ -5,11 +5,12 @@ from typing import Any
 
 import viser
 
-from actuated_characters.timeline import edits
+from actuated_characters.timeline.edits import rounded
 from actuated_characters.viewer.controls.actions import ActionQueue
 from actuated_characters.viewer.editor.event_forms import FORMS, LINK, NUMBER, Field, read_form
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.recorded.playback_controls import on
+from msgs_config.errors import MotionError
 
 _LASTS, _SHORTEST = 1.0, 0.02  # s: at first, at least
 _UNTIL, _LENGTH = "until", "lasts (s)"
@@ -34,7 +35,8 @@ class EventForm:
         label = f"{field.name}"
         if field.name == _UNTIL:  # said as a length: the present time may yet change
             hint = "s from the present time on"
-            return self._gui.add_number(_LENGTH, _LASTS, min=_SHORTEST, step=0.01, hint=hint)
+            # 0 is where a number such as 0.5 begins to be typed
+            return self._gui.add_number(_LENGTH, _LASTS, min=0.0, step=0.01, hint=hint)
         if field.kind == NUMBER:
             return self._gui.add_number(label, float(field.default), step=0.01, hint=field.about)
         if field.kind == LINK:
@@ -47,8 +49,8 @@ class EventForm:
             for handle in handles.values():
                 handle.visible = name == track
 
-    def edit(self) -> edits.Edit:
-        """The edit that adds what the fields say at the present time.
+    def event(self) -> tuple[str, dict[str, Any]]:
+        """The track that is chosen, and what the fields say at the present time.
 
         Raises:
             MotionError: a field cannot be read.
@@ -56,5 +58,8 @@ class EventForm:
         track = str(self._track.value)
         given = {name: handle.value for name, handle in self._handles[track].items()}
         if _UNTIL in given:
-            given[_UNTIL] = edits.rounded(self._session.time + float(given[_UNTIL]))
-        return edits.add_event(track, read_form(track, self._session.time, given))
+            lasts = float(given[_UNTIL])
+            if lasts < _SHORTEST:
+                raise MotionError(f"{_LENGTH} is {lasts:g}; it must be {_SHORTEST:g} or more")
+            given[_UNTIL] = rounded(self._session.time + lasts)
+        return track, read_form(track, self._session.time, given)

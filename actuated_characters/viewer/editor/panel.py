@@ -148,13 +148,16 @@ class EditorPanel:
             on(self._actions, self._event, lambda _: self.act(self._choose_event))
             change = {
                 "Go": self._go_to_event,
-                "Move here": lambda: self._edit_event(edits.move_event),
-                "Copy here": lambda: self._edit_event(edits.copy_event),
+                "Move here": self._move_event,
+                "Copy here": self._copy_event,
             }
             self._buttons("This event", change)
             self._buttons("", {"Delete event": self._delete_event})
             self._form = EventForm(gui, session, TRACKS, self._actions)
-            self._buttons("At this time", {"Add event": lambda: session.edit(self._form.edit())})
+            self._buttons("At this time", {"Add event": self._add_event})
+
+    def _add_event(self) -> None:
+        self.chosen.add(*self._form.event())
 
     def _listed_event(self) -> Item | None:
         options = list(self._event.options)
@@ -164,9 +167,15 @@ class EditorPanel:
     def _choose_event(self) -> None:
         self.chosen.choose(self._listed_event())
 
-    def _edit_event(self, edit: Callable[[str, int, float], edits.Edit]) -> None:
+    def _move_event(self) -> None:
         if (item := self._listed_event()) is not None:
-            self._session.edit(edit(item.track, item.number, self._session.time))
+            self.chosen.move(item, self._session.time)
+
+    def _copy_event(self) -> None:
+        if (item := self._listed_event()) is not None:
+            self.chosen.choose(item)
+            self.chosen.copy()
+            self.chosen.paste()
 
     def _delete_event(self) -> None:
         if (item := self._listed_event()) is not None:

@@ -28,6 +28,7 @@ class ShownTakes:
         self._run: RecordedRun | None = None  # of the chosen one
         self._other: RecordedRun | None = None  # what it is compared with
         self._process: CommandProcess | None = None
+        self._simulated = ""  # what it has said last of how far it is
         self._ready: CommandProcess | None = None  # for the next one, once there was one
         self._begun = 0.0
         self.version = 0
@@ -97,8 +98,9 @@ class ShownTakes:
     @property
     def simulated(self) -> str:
         """How far the take is that is being made, as its command says it; empty before it says."""
-        said = "" if self._process is None else self._process.last_line
-        return said if said.startswith(_SIMULATED) else ""
+        if self._process is not None and self._process.last_line.startswith(_SIMULATED):
+            self._simulated = self._process.last_line
+        return self._simulated
 
     def simulate(self, title: str) -> None:
         """Begin to make a take of the file as it is, and see it, unless an edit comes first.
@@ -117,7 +119,7 @@ class ShownTakes:
             arguments += ["--of", self._origin.name]
         self._awaited = True
         self._process, self._begun = self._ready or CommandProcess(), time.monotonic()
-        self._ready = None
+        self._ready, self._simulated = None, ""
         self._process.begin(arguments)
 
     def cancel(self) -> None:
@@ -147,7 +149,7 @@ class ShownTakes:
         new = [take for take in self._known if take.name not in before]
         if error or not new:
             return error or next((line for line in words if line.startswith("nothing")), "")
-        said = " ".join(line for line in words if line.startswith(("take ", "it falls")))
+        said = "; ".join(line for line in words if line.startswith(("take ", "it falls")))
         if not self._awaited:
             self._origin = new[-1]
             return f"{said}; choose it in Seen"

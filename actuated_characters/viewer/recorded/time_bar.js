@@ -57,6 +57,18 @@
     }
   }
 
+  function drawTicks() { // a dozen at most, at round times
+    const { first, last } = told, least = Math.max(last - first, 1e-3) / 12;
+    const decade = 10 ** Math.floor(Math.log10(least));
+    const every = decade * [1, 2, 5, 10].find(each => decade * each >= least - 1e-9);
+    for (let tick = Math.ceil(first / every - 1e-9); tick * every <= last + 1e-9; tick++) {
+      const made = make("div", "tick", track);
+      made.style.left = percent(tick * every);
+      made.dataset.at = Number((tick * every).toFixed(4));
+      made.dataset.made = "";
+    }
+  }
+
   async function fetchMarks(version) {
     asked = version;
     const found = await fetch(ADDRESS).then(response => response.json()).catch(() => null);
@@ -68,6 +80,7 @@
     const ghost = told.ghost && `${told.ghost}: `;
     told.ghostMarks = told.ghostMarks.filter(({ kind, start }) => start <= told.last
       && kind !== "keyframe" && kind !== "end");
+    drawTicks();
     const all = [...told.marks.map(each => [each, ""]), ...told.ghostMarks.map(each => [each, ghost])];
     for (const wanted of [true, false])
       all.filter(([each]) => (each.kind === "mode") === wanted).forEach(each => draw(...each));
@@ -112,8 +125,8 @@
     tip.style.left = `calc(${percent(at)} + ${aside}px)`;
   }
   track.onpointermove = event => {
-    const at = timeOf(event);
-    say(at, marksNear(at).map(({ text }) => text));
+    const at = timeOf(event), { step } = told;
+    say(step ? Math.round(at / step) * step : at, marksNear(at).map(({ text }) => text));
     if (drags && performance.now() - sentAt > SEND_PERIOD) {
       sentAt = performance.now();
       seek(at);
@@ -132,17 +145,23 @@
     End: () => press("End"),
   };
   // A control that the keyboard has come to keeps its keys; a button that was clicked does not.
+  let isByMouse = false; // how the keyboard's focus has come to where it is
+  addEventListener("pointerdown", () => { isByMouse = true; }, true);
   const isFree = ({ target }) => bar.contains(target)
-    || !target.closest?.(`${NOT_OURS}, button:focus-visible`);
+    || !target.closest?.(isByMouse ? NOT_OURS : `${NOT_OURS}, button`);
+  let taken = false; // the key that is down was ours
   addEventListener("keydown", event => {
+    if (event.key === "Tab") isByMouse = false;
     const act = KEYS[event.key];
+    taken = false;
     if (!act || !told || event.ctrlKey || event.metaKey || event.altKey || !isFree(event)) return;
     event.preventDefault();
     event.stopPropagation(); // or viser would turn the camera by the arrow keys
+    taken = true;
     act(event.shiftKey);
   }, true);
   addEventListener("keyup", event => { // on which a button would be pressed by space
-    if (event.key === " " && bar.contains(event.target)) event.preventDefault();
+    if (event.key === " " && (taken || bar.contains(event.target))) event.preventDefault();
   }, true);
 
   // Beside the panel where it reaches down to the bar, else as wide as the page.

@@ -35,7 +35,10 @@ def test_takes_are_made_listed_and_go_on_from_each_other(
     assert "nothing has changed: take 1 is of this file" in said(file)
     written(tmp_path, pushes=[PUSH])
     words = said(file, "--title", "harder")
-    assert "take 2, of take 1: the same up to 0.500 s; simulated from 0.5 to 0.6 s" in words
+    assert (
+        "take 2, of take 1: the same up to 0.500 s, simulated from the keyframe at 0.5 s on"
+        in words
+    )
     assert f"actuated_characters view {tmp_path / 'moves.takes' / '2'}" in words
     written(tmp_path, pushes=[{**PUSH, "link": "neck"}])
     assert "take 3, of take 1" in said(file, "--of", "1")

@@ -15,6 +15,7 @@ from actuated_characters.viewer.editor.page import EditorPage
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.web.server import serving
 from tests.support.physics import character
+from tests.support.ros import wait_until
 
 HUMANOID = character("humanoid")
 WRIST = [link.name for link in HUMANOID.links].index("right_wrist")
@@ -124,11 +125,46 @@ def test_an_event_of_a_form_is_added_marked_and_deleted(page: EditorPage, sessio
     assert "push" in [mark["kind"] for mark in told(page)["marks"]]
     assert page._panel._event.value == "pushes 1: 2 s, link chest, force 0 200 0"
 
+    form._handles["pushes"]["link"].value = "neck"
     session.playback.seek(3.0)
-    click(page, "Move here")
-    assert session.document.content["pushes"][0]["at"] == 3.0
+    click(page, "Add event")
+    assert page._panel._event.value == "pushes 2: 3 s, link neck, force 0 200 0"
+    session.playback.seek(1.0)
+    click(page, "Move here")  # the one that was added last, and is the first one now
+    assert page._panel._event.value == "pushes 1: 1 s, link neck, force 0 200 0"
+    assert [each["at"] for each in session.document.content["pushes"]] == [1.0, 2.0]
+    session.playback.seek(4.0)
+    click(page, "Copy here")
+    click(page, "Delete event")
+    click(page, "Go")
+    click(page, "Delete event")
     click(page, "Delete event")
     assert "pushes" not in session.document.content
+
+
+def test_what_lasts_no_time_is_refused_once_it_is_added(page: EditorPage, session: Session) -> None:
+    form = page._panel._form
+    form._track.value = "limp"
+    form._show("limp")
+    form._handles["limp"]["until"].value = 0.0  # as 0.5 begins
+    click(page, "Add event")
+
+    assert "lasts (s) is 0; it must be 0.02 or more" in page._panel._told.content
+    assert "limp" not in session.document.content
+
+
+def test_a_length_of_two_digits_is_one_edit(page: EditorPage, session: Session) -> None:
+    length = page._panel._take_panel
+    for seconds in (1.0, 12.0):
+        length._type_duration(seconds)
+        page.step(0.0)
+        assert "duration" not in session.document.content
+
+    wait_until(lambda: "duration" in session.document.content, "it", step=lambda: page.step(0.0))
+
+    assert session.document.content["duration"] == 12.0
+    click(page, "Undo")
+    assert "duration" not in session.document.content
 
 
 def test_the_time_line_grows_with_what_is_on_it(page: EditorPage, session: Session) -> None:
@@ -201,6 +237,7 @@ def test_behaviour_and_duration_are_those_of_the_file(page: EditorPage, session:
     takes = page._panel._take_panel
     change(page, takes._behaviour, "active_ragdoll")
     change(page, takes._length, 9.0)
+    wait_until(lambda: "duration" in session.document.content, "it", step=lambda: page.step(0.0))
     assert session.document.content["run"] == {"behaviour": "active_ragdoll"}
     assert session.document.content["duration"] == 9.0
 

@@ -68,6 +68,7 @@ def test_keys_and_events_are_dragged_chosen_and_edited_by_the_keyboard(
     check_that_an_end_is_dragged(browser, file)
     check_that_what_is_chosen_is_copied_and_deleted(browser, file)
     check_that_a_field_keeps_its_keys(browser, file)
+    check_that_space_plays_after_a_button(browser, file)
     assert not browser.console
 
 
@@ -193,4 +194,22 @@ def check_that_a_field_keeps_its_keys(browser: Browser, file: Path) -> None:
     tap(browser, "Delete")
     tap(browser, "z", keys=CONTROL)
     browser.evaluate("new Promise(done => setTimeout(done, 500))")
+    assert file.read_text() == before
+
+
+def check_that_space_plays_after_a_button(browser: Browser, file: Path) -> None:
+    """A button that was clicked has the keyboard, but no use for it."""
+    button = """[...document.querySelectorAll("button, label")].find(
+        each => each.innerText.trim() === "Copy").getBoundingClientRect()"""
+    box = browser.evaluate(f"(({{x, y, width, height}}) => [x, y, width, height])({button})")
+    click_on(browser, box[0] + box[2] / 2, box[1] + box[3] / 2)
+    before = file.read_text()
+    plays = "document.querySelector('#time-line .play').getAttribute('aria-label')"
+    assert browser.evaluate(plays) == "Play"
+
+    tap(browser, "Space")
+
+    wait_until(lambda: browser.evaluate(plays) == "Pause", "it plays", SOON)
+    tap(browser, "Space")
+    wait_until(lambda: browser.evaluate(plays) == "Play", "it stands", SOON)
     assert file.read_text() == before
