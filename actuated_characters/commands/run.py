@@ -107,8 +107,8 @@ def _run(options: argparse.Namespace) -> None:
 
     if options.parameters is not None:
         plan = planned_run(options).plan
-        _check_options(options, plan)
-        print_parameters(options.parameters, plan, _recording(options, plan))
+        check_options(options, plan)
+        print_parameters(options.parameters, plan, recording_of(options, plan))
         return
     if options.view:
         require_extra("view", "--view")
@@ -119,7 +119,7 @@ def _run(options: argparse.Namespace) -> None:
         require_extra("wheels", "a run over topics, unlike one --in-process,")
     run = planned_run(options)
     plan, motion = run.plan, run.plan.motion_name
-    _check_options(options, plan)
+    check_options(options, plan)
     name = f"{plan.character.name}-{Path(motion).stem}"
     directory = (options.output or Path("runs") / name).absolute()
     if options.output is None and not options.overwrite:
@@ -153,7 +153,7 @@ def _run(options: argparse.Namespace) -> None:
     print(f"a picture of the figures: {directory / PLOT}")
 
 
-def _check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
+def check_options(options: argparse.Namespace, plan: "RunPlan") -> None:
     """Raise ConfigurationError where options contradict each other."""
     if options.in_process and options.view:
         raise ConfigurationError("--view shows what is on ROS' topics; --in-process has none")
@@ -189,7 +189,7 @@ def _recorded_sensors(options: argparse.Namespace, plan: "RunPlan") -> list[str]
     return list(options.sensor)
 
 
-def _recording(options: argparse.Namespace, plan: "RunPlan") -> dict[str, object]:
+def recording_of(options: argparse.Namespace, plan: "RunPlan") -> dict[str, object]:
     """The recorder's parameters that are given."""
     given = {parameter: getattr(options, name) for name, parameter in _RECORDING.items()}
     given["sensors"] = _recorded_sensors(options, plan)
@@ -219,7 +219,7 @@ def _run_plan(
         directory,
         write_bag=not options.no_record,
         progress=progress,
-        recording=_recording(options, plan),
+        recording=recording_of(options, plan),
         inputs=planned.inputs,
     )
     has_states = throws and not options.no_record

@@ -1,0 +1,164 @@
+"""One row of a sweep: a run in this process, and what became of it."""
+
+import os
+import shutil
+import socket
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from actuated_characters.recorder.run_directory import prepare_directory, read_metrics
+from actuated_characters.report.verdict import describe_end, describe_law
+from actuated_characters.runs.in_process import run_in_process
+from actuated_characters.runs.plan import RunPlan
+from actuated_characters.runs.planned.inputs import PlannedInputs
+from actuated_characters.sweep.grid import Cell
+from msgs_config.errors import ActuatedCharactersError, RecordingError
+from msgs_config.versions import installed_versions
+
+FIGURES = (
+    *("ticks", "sim_time_s", "actuators", "root_actuators", "degrees_of_freedom"),
+    *("fell", "fell_at_s", "fell_in_mode"),
+    *("joint_error_mean_rad", "slider_error_mean_m", "slider_error_max_m"),
+    *("root_error_mean_m", "root_error_max_m", "assist_force_mean_n", "body_weight_n"),
+    *("saturated_fraction", "rejected_commands", "duplicate_commands"),
+    *("missing_ticks", "dropped_references"),
+)
+"""Of a run's summary, those that are the same whenever and wherever it is computed again."""
+_ENGINES = ("actuated_characters", "mujoco-core", "pybullet")
+_THREADS = "controller_node.plan.workers"
+ROWS = "rows"
+"""The folder of the bags that are kept."""
+_RUN = "run"
+
+
+@dataclass(frozen=True)
+class AskedRun:
+    """A run as its arguments ask for it."""
+
+    plan: RunPlan
+    inputs: PlannedInputs
+    recording: Mapping[str, object]  # parameters of the recorder
+
+
+Ask: TypeAlias = Callable[[Sequence[str]], AskedRun]
+"""Makes a run of the arguments of `run`; raises ActuatedCharactersError if there is none."""
+
+
+@dataclass(frozen=True)
+class RowTask:
+    """What a worker is told of a row."""
+
+    number: int
+    arguments: tuple[str, ...]
+    bags: str  # whether its bag is kept: `none`, `failures` or `all`
+    results: Path  # of the sweep
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a row; equal wherever it is computed."""
+
+    figures: Mapping[str, Cell]
+    verdict: str = ""
+    state_hash: str = ""
+    error: str = ""  # why it was refused, or failed: one line
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether its character fell, or there was an error."""
+        return bool(self.error) or self.figures.get("fell") is True
+
+
+@cache
+def engine_versions() -> Mapping[str, str]:
+    """The versions that a row's last bits depend on, in this process."""
+    versions = installed_versions()
+    return {name: versions[name] for name in _ENGINES}
+
+
+def row_directory(results: Path, number: int) -> Path:
+    """Where a row's bag is kept."""
+    return results / ROWS / f"{number:05d}"
+
+
+def compute(task: RowTask, ask: Ask, scratch: Path | None = None) -> Outcome:
+    """Run a row.
+
+    The planner of each has one thread, unless the row says otherwise: the workers have the
+    processors. What the row itself is to blame for is part of the outcome.
+
+    Args:
+        task: The row.
+        ask: Makes its run.
+        scratch: Where a folder for its files is made, which is deleted in the end.
+
+    Raises:
+        OSError: the files cannot be written.
+        RecordingError: likewise.
+    """
+    with tempfile.TemporaryDirectory(prefix="row-", dir=scratch) as folder:
+        directory = Path(folder) / _RUN
+        outcome = _outcome(task, ask, directory)
+        if task.bags == "all" or (task.bags == "failures" and outcome.has_failed):
+            _keep(directory, row_directory(task.results, task.number))
+        return outcome
+
+
+def with_one_thread(arguments: Sequence[str]) -> list[str]:
+    """The arguments of a run whose planner has one thread, unless they say otherwise."""
+    if any(each.startswith(f"--set={_THREADS}:=") for each in arguments):
+        return list(arguments)
+    return [*arguments, f"--set={_THREADS}:=1"]
+
+
+def _outcome(task: RowTask, ask: Ask, directory: Path) -> Outcome:
+    try:
+        asked = ask(with_one_thread(task.arguments))
+        prepare_directory(directory, overwrite=False)
+        run_in_process(
+            asked.plan,
+            directory,
+            write_bag=task.bags != "none",
+            recording=asked.recording,
+            inputs=asked.inputs,
+        )
+    except RecordingError:
+        raise  # the disk is full, or the like: not what becomes of the row anywhere
+    except ActuatedCharactersError as error:
+        words = " ".join(str(error).split())
+        return Outcome({}, error=words.replace(str(directory), _RUN))  # no path of this worker
+    summary, series = read_metrics(directory)
+    has_reference = bool(np.isfinite(series["joint_error_mean_rad"]).any())
+    verdict = describe_end(
+        summary, describe_law(asked.plan.controller), has_reference=has_reference
+    )
+    return Outcome(_figures(summary), verdict, summary["state_hash"])
+
+
+def _figures(summary: Mapping[str, Any]) -> dict[str, Cell]:
+    return {name: summary[name] for name in FIGURES}
+
+
+def _keep(directory: Path, kept: Path) -> None:
+    """Move a run's files to where they are kept, whole or not at all; they may be there already."""
+    if not directory.is_dir():
+        return  # the row was refused
+    if not kept.parent.parent.is_dir():
+        raise RecordingError(
+            f"{kept.parent.parent} is not there on {socket.gethostname()}; bags need a folder that "
+            "all workers see, or 'bags: none'"
+        )
+    kept.parent.mkdir(exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{kept.name}.", dir=kept.parent))
+    try:
+        shutil.move(directory, part / kept.name)
+        shutil.rmtree(kept, ignore_errors=True)
+        os.rename(part / kept.name, kept)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
