@@ -16,7 +16,7 @@ ROOTS = (
 SHARED = {
     "launch": "*.launch.py",
     "config": "*.*",
-    "examples": "*.py",
+    "examples": "*.*",
     "examples/without_rclpy": "*",
 }
 setup(
@@ -90,6 +90,10 @@ setup(
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
         "docs": ["furo>=2024.8", "myst-parser>=4,<6", "sphinx>=8,<9"],
+        # `sweep`: on all processors, or on a cluster of Dask (35 MB with what it needs, BSD-3).
+        # cryptography keeps its ports from others (17 MB, Apache-2.0 or BSD-3); pyarrow writes the
+        # table as Parquet, too (170 MB, Apache-2.0), and may be missing.
+        "sweep": ["cryptography>=42", "dask>=2025.1", "distributed>=2025.1", "pyarrow>=17"],
         # Completion of the command line in bash and zsh (43 kB, Apache-2.0, pure Python).
         "completion": ["argcomplete>=3.5,<4"],
         # `view` and `run --view`: characters in a browser (50 MB with what it needs, MIT; the web
@@ -110,6 +114,9 @@ setup(
         "test": [
             "argcomplete>=3.5,<4",
             "av>=14,<19",
+            "cryptography>=42",
+            "dask>=2025.1",
+            "distributed>=2025.1",
             "furo>=2024.8",
             "gymnasium>=1.0,<2",
             "hypothesis>=6.98,<7",
@@ -118,6 +125,7 @@ setup(
             "mypy>=2.4,<2.5",
             "myst-parser>=4,<6",
             "onnx>=1.17,<2",
+            "pyarrow>=17",
             "pytest>=7.4,<10",
             "pytest-xdist>=3.5,<4",
             "ruff>=0.17.5,<0.18",

@@ -8,6 +8,7 @@ PACKAGES = {
     "gymnasium": ("gymnasium",),
     "meshes": ("trimesh",),
     "onnx": ("onnx",),
+    "sweep": ("distributed", "cryptography"),
     "video": ("av",),
     "view": ("viser", "websockets"),
     "wheels": ("rclpy",),

@@ -54,7 +54,7 @@ class WorkerProcesses:
 
     def submit(self, task: Callable[P, T], *given: P.args, **named: P.kwargs) -> Future[T]:
         """Begin a task, and more processes if there are too few."""
-        with _interrupts_blocked():  # here while processes start, and in them for good
+        with interrupts_blocked():  # here while processes start, and in them for good
             return self._pool.submit(task, *given, **named)
 
     def map(self, task: Callable[[Item], T], items: Iterable[Item]) -> Iterator[T]:
@@ -63,13 +63,13 @@ class WorkerProcesses:
         The pool's own `map` cancels what an interrupt leaves; a pool whose processes are ended
         then fails over what is cancelled, and waits for ever at the exit (seen in Python 3.11).
         """
-        with _interrupts_blocked():
+        with interrupts_blocked():
             begun = [self._pool.submit(task, item) for item in items]
         return (future.result() for future in begun)
 
 
 @contextmanager
-def _interrupts_blocked() -> Iterator[None]:
+def interrupts_blocked() -> Iterator[None]:
     """Ctrl-C waits; a process that is begun meanwhile leaves it to the one that began it."""
     if threading.current_thread() is not threading.main_thread():
         yield

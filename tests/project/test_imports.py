@@ -178,7 +178,7 @@ def test_every_python_package_that_is_imported_is_required() -> None:
     arguments = setup_arguments()
     requirements = ast.literal_eval(arguments["install_requires"])
     extras = ast.literal_eval(arguments["extras_require"])
-    optional = ("video", "gymnasium", "onnx", "completion", "meshes", "view", "xacro")
+    optional = ("video", "gymnasium", "onnx", "completion", "meshes", "sweep", "view", "xacro")
     requirements += [each for extra in optional for each in extras[extra]]
     names = {re.split(r"[<>=[]", requirement)[0] for requirement in requirements}
     required = {distributions.get(name, name) for name in names}

@@ -12,6 +12,7 @@ from actuated_characters.commands.common.settings import NODES, node_settings
 from actuated_characters.sweep.file import Sweep, read_sweep
 from actuated_characters.sweep.row import FIGURES
 from msgs_config.errors import ConfigurationError
+from tests.support.programs import PROJECT
 
 
 def read(folder: Path, text: str) -> Sweep:
@@ -207,3 +208,12 @@ def test_the_options_of_rows_are_those_that_describe_a_run() -> None:
         **dict.fromkeys(("duration", "compression", "log-time"), False),
         **dict.fromkeys(("push", "throw", "sensor", "exclude"), True),
     }
+
+
+def test_the_page_shows_the_example_that_is_shipped() -> None:
+    example = (PROJECT / "examples/pushes.yaml").read_text("utf-8")
+    page = (PROJECT / "docs/sweep.md").read_text("utf-8")
+
+    _, _, content = example.partition("\n\n")
+    assert f"```yaml\n{content.partition('run:')[1]}{content.partition('run:')[2]}```" in page
+    assert len(read_sweep(PROJECT / "examples/pushes.yaml", row_options(), FIGURES).rows()) == 12
