@@ -84,7 +84,10 @@ def _sweep(options: argparse.Namespace) -> int:
         raise ConfigurationError(f"--workers is {options.workers}; it must be 1 or more")
     sweep = read_sweep(options.file, row_options(), FIGURES)
     rows = sweep.rows()
-    check_rows(options.file, asked_run, rows_to_check(sweep.axes, rows, _MOST_CHECKED))
+    for warning in check_rows(
+        options.file, asked_run, rows_to_check(sweep.axes, rows, _MOST_CHECKED)
+    ):
+        print(warning)
     directory = (options.output or _FOLDER / options.file.stem).absolute()
     job = Job(sweep, rows, directory, options.verify)
     check_interruption()  # all modules are imported by now

@@ -13,7 +13,15 @@ from threading import Lock
 from typing import TypeAlias
 
 import dask
-from distributed import Client, Future, LocalCluster, Security, as_completed, get_worker
+from distributed import (
+    Client,
+    Future,
+    KilledWorker,
+    LocalCluster,
+    Security,
+    as_completed,
+    get_worker,
+)
 
 from actuated_characters.runs.held_signals import signals_held
 from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute, engine_versions
@@ -21,6 +29,7 @@ from actuated_characters.sweep.work import Answer
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from msgs_config.runtime.worker_processes import interrupts_blocked
 
+_MOST_SHOWN = 300  # characters of an error that nobody foresaw
 _WAITING = 3  # rows that wait, for each one that is computed
 _PATIENCE = 10.0  # s until a scheduler must have answered
 _CONFIGURATION = {
@@ -86,7 +95,9 @@ class DaskWorkers:
         line = " ".join(f"{type(error).__name__}: {error}".split())
         if isinstance(error, (ActuatedCharactersError, OSError, ImportError)):
             raise RunError(f"row {task.number}: {error}")
-        return Answer(task, is_repeat, None, failure=line[:300])
+        if isinstance(error, KilledWorker):
+            line = "each worker that was at it died"
+        return Answer(task, is_repeat, None, failure=line[:_MOST_SHOWN])
 
     def _threads(self) -> Mapping[str, int]:
         """The number of threads of each worker, by address."""

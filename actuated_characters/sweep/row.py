@@ -44,6 +44,7 @@ class AskedRun:
     plan: RunPlan
     inputs: PlannedInputs
     recording: Mapping[str, object]  # parameters of the recorder
+    warnings: Sequence[str] = ()  # sentences that the user should read
 
 
 Ask: TypeAlias = Callable[[Sequence[str]], AskedRun]

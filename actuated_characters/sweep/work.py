@@ -79,17 +79,21 @@ class Report:
     undone: list[str] = field(default_factory=list)  # a line for each row that could not be done
 
 
-def check_rows(path: Path, ask: Ask, rows: Iterable[Row]) -> None:
+def check_rows(path: Path, ask: Ask, rows: Iterable[Row]) -> list[str]:
     """Plan rows, so that what is wrong with them is said before anything runs.
+
+    Returns the sentences that the user should read, each once.
 
     Raises:
         ConfigurationError: a row cannot be; names the file, the row and what is wrong.
     """
+    warnings: dict[str, None] = {}
     for row in rows:
         try:
-            ask(row.arguments)
+            warnings |= dict.fromkeys(ask(row.arguments).warnings)
         except ActuatedCharactersError as error:
             raise ConfigurationError(f"{path}: {describe_row(row)}: {error}") from error
+    return list(warnings)
 
 
 def describe_row(row: Row) -> str:

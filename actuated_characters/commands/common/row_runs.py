@@ -45,7 +45,7 @@ def asked_run(arguments: Sequence[str]) -> AskedRun:
     options = _parser().parse_args(["run", *arguments, "--in-process"])
     run = planned_run(options)
     check_options(options, run.plan)
-    return AskedRun(run.plan, run.inputs, recording_of(options, run.plan))
+    return AskedRun(run.plan, run.inputs, recording_of(options, run.plan), run.warnings)
 
 
 @cache

@@ -3,13 +3,15 @@
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from actuated_characters.runs.planned.inputs import NO_INPUTS
 from actuated_characters.sweep.file import Sweep
 from actuated_characters.sweep.grid import Row
 from actuated_characters.sweep.journal import Journal
-from actuated_characters.sweep.row import Outcome, RowTask
+from actuated_characters.sweep.row import AskedRun, Outcome, RowTask
 from actuated_characters.sweep.work import Answer, Job, check_rows, work
 from msgs_config.errors import ConfigurationError, RunError
 
@@ -172,3 +174,14 @@ def test_a_row_that_cannot_be_planned_is_named(tmp_path: Path) -> None:
 
     wanted = "a.yaml: row 3 (clip wlak, sim_node.friction 0.8): unknown clip 'wlak'"
     assert str(raised.value) == f"{tmp_path}/{wanted}"
+
+
+def test_what_the_user_should_read_of_rows_is_said_once(tmp_path: Path) -> None:
+    plan: Any = None
+
+    def warn(arguments: Sequence[str]) -> AskedRun:
+        return AskedRun(plan, NO_INPUTS, {}, ["of all", *arguments])
+
+    rows = [Row(1, ("of one",), {}), Row(2, ("of the other",), {})]
+
+    assert check_rows(tmp_path, warn, rows) == ["of all", "of one", "of the other"]
