@@ -84,8 +84,9 @@ setup(
         ],
         # The engine Bullet where pip must compile it (eight minutes of a processor).
         "bullet": ["pybullet==3.2.7"],
-        # `export` of a policy as .onnx (36 MB with what it needs, Apache-2.0).
-        "onnx": ["onnx>=1.17,<2"],
+        # `export` of a policy as .onnx (36 MB with what it needs, Apache-2.0), and the behaviour
+        # `onnx`, which plays others' (onnxruntime: a download of 28 MB, MIT).
+        "onnx": ["onnx>=1.17,<2", "onnxruntime>=1.20,<2"],
         # `gymnasium.make("actuated_characters/Track-v0")` (4 MB with what it needs, MIT).
         "gymnasium": ["gymnasium>=1.0,<2"],
         # `make docs`: the pages as a site (60 MB with what they need, BSD-2 and MIT).
@@ -125,6 +126,7 @@ setup(
             "mypy>=2.4,<2.5",
             "myst-parser>=4,<6",
             "onnx>=1.17,<2",
+            "onnxruntime>=1.20,<2",
             "pyarrow>=17",
             "pytest>=7.4,<10",
             "pytest-xdist>=3.5,<4",

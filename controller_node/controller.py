@@ -178,8 +178,9 @@ class Controller:
             MotionError: the character cannot follow it.
             LayoutError: a degree of freedom does not exist, or part of a ball joint is missing.
         """
-        if self._choice.makes_effort:
-            raise MotionError("the behaviour tracks no trajectory; cmd_vel steers it")
+        if not self._choice.follows_motion:
+            remedy = "; cmd_vel steers it" if self.is_steered else ""
+            raise MotionError(f"the behaviour tracks no trajectory{remedy}")
         self._enter_episode(episode_ns)
         self._tracked.replace(points, start_ns, now_ns, self._behaviour.carry)
         self._behaviour.carry = PlanarTransform()

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from controller_node.behaviours.factory import BehaviourSettings, behaviour_clips
+from controller_node.behaviours.onnx_policy.factory import ONNX, policy_files
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
 from controller_node.controller_settings import LawSettings
@@ -35,6 +36,8 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
         files["timeline"] = timeline_path(TimelineSettings.of(values).timeline)
     if behaviour == STATE_MACHINE:
         files["machine"] = machine_path(MachineSettings.of(values).machine)
+    if behaviour == ONNX:
+        files |= policy_files(values)
     if PlannerParameters.of(values).planner in (POLICY, HYBRID):
         from controller_node.planner.policy.choosing import policies_read  # compiled code
 

@@ -13,6 +13,7 @@ from controller_node.behaviours.factory import (
     behaviour_clips,
     choose_behaviour,
 )
+from controller_node.behaviours.onnx_policy.factory import ONNX
 from controller_node.behaviours.settings import check_terrain
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.control_laws import LAWS, GainArrays
@@ -183,7 +184,7 @@ def _is_ragdoll(values: Values) -> bool:
 def _assists(values: Values) -> bool:
     """Whether the root is driven; not that of planned joint torques, and not by all behaviours."""
     plans = PlannerParameters.of(values).planner != NO_PLANNER
-    unassisted = BehaviourSettings.of(values).behaviour in ("ragdoll", STATE_MACHINE)
+    unassisted = BehaviourSettings.of(values).behaviour in ("ragdoll", STATE_MACHINE, ONNX)
     return ControllerOptions.of(values).root_assistance and not plans and not unassisted
 
 

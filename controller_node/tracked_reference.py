@@ -80,8 +80,8 @@ class TrackedReference:
         """
         if not isinstance(self._reference, SteeredReference):
             raise MotionError(
-                "cmd_vel: the reference is not steered; parameter 'reference' must be 'steered', "
-                "and no trajectory may have replaced it"
+                "cmd_vel: the reference is not steered; parameter 'reference' must be 'steered' or "
+                "'commanded', and no trajectory may have replaced it"
             )
         steered = self._reference.steered(command, now)
         self._reference, self._known = steered.reference, []

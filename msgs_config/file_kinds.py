@@ -51,7 +51,7 @@ _KINDS: dict[str, tuple[str, str]] = {  # what a file is, and what to do with it
     ".npy": ("a NumPy array", _NONE_HERE),
     ".pkl": ("a Python pickle", _NONE_HERE),
     ".pt": ("a PyTorch file", _NONE_HERE),
-    ".onnx": ("a network (ONNX)", _NONE_HERE),
+    ".onnx": ("a network (ONNX)", "'run --onnx FILE' plays a policy"),
     ".urdf": ("the description of a robot (URDF)", _CHARACTER),
     ".xacro": ("a xacro file", _CHARACTER),
     ".sdf": ("a model or world of Gazebo (SDF)", _FROM_URDF),

@@ -11,6 +11,7 @@ from controller_node.behaviours.factory import (
     choose_behaviour,
     make_motion,
 )
+from controller_node.behaviours.onnx_policy.factory import ONNX, policy_path
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
@@ -83,6 +84,8 @@ class RunPlan:
         """The name of the motion that is tracked."""
         if BehaviourSettings.of(self.controller).behaviour == STATE_MACHINE:
             return MachineSettings.of(self.controller).machine
+        if BehaviourSettings.of(self.controller).behaviour == ONNX:
+            return policy_path(self.controller).stem
         kind = MotionSettings.of(self.controller).reference
         if kind == "keyframes":
             return KeyframesSettings.of(self.controller).keyframes
@@ -135,7 +138,7 @@ def make_plan(
     commanded = controller_parameters.commanded_joints(character, controller)
     defaults = {"commanded_joints": commanded, **as_values(motion.first_state())}
     stands_by_itself = PlannerParameters.of(controller).planner not in (NO_PLANNER, RECORDED)
-    if stands_by_itself or BehaviourSettings.of(controller).behaviour == STATE_MACHINE:
+    if stands_by_itself or BehaviourSettings.of(controller).behaviour in (STATE_MACHINE, ONNX):
         defaults |= STEADY_CONTACTS
     simulator = _simulator_values(character, {**defaults, **simulator_given}, duration)
     controller_parameters.check_world(controller, simulator)

@@ -124,7 +124,8 @@ class BehaviourChoice:
     make: Callable[[], Behaviour] = Tracking
     needs_contacts: bool = False
     opponent: str = ""  # the character whose place it needs, if it needs one
-    makes_effort: bool = False  # it takes the place of a law and of a trajectory's targets
+    makes_effort: bool = False  # it takes the place of a law
+    follows_motion: bool = True  # what it does depends on the reference's poses
     can_be_asked: bool = False  # whether `~/behaviour` says what of it is wanted
 
     def check(self, around: Surroundings) -> None:

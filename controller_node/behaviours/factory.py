@@ -3,6 +3,7 @@
 from controller_node.behaviours import reaction_factory  # noqa: F401  registers its own
 from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.motion_library import clips_of_library
+from controller_node.behaviours.onnx_policy import factory as onnx_policy  # noqa: F401  registers its own
 from controller_node.behaviours.pursuit import PursuitSettings
 from controller_node.behaviours.settings import REACTIONS, ReactionSettings
 from controller_node.behaviours.state_machine import factory as state_machine
@@ -21,7 +22,8 @@ class BehaviourSettings(Settings):
     behaviour: str = parameter(
         "tracking",
         "track whatever comes; be limp; track, and go limp on a hard hit; likewise, and go for an "
-        "opponent; track, and react to a hit; or go through the states of a machine",
+        "opponent; track, and react to a hit; go through the states of a machine; or play another "
+        "trainer's policy",
         choices=BEHAVIOURS.names,
     )
 

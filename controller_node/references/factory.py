@@ -15,7 +15,8 @@ class MotionSettings(Settings):
     reference: str = parameter(
         "hold",
         "what to track: the rest pose, keyframes, a timeline, a motion clip, a test signal from "
-        "the rest pose, or a walk steered by cmd_vel; a message on ~/joint_trajectory replaces it",
+        "the rest pose, a walk steered by cmd_vel, or the rest pose that goes where cmd_vel says; "
+        "a message on ~/joint_trajectory replaces it",
         choices=REFERENCES.names,
     )
 

@@ -7,7 +7,7 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 PACKAGES = {
     "gymnasium": ("gymnasium",),
     "meshes": ("trimesh",),
-    "onnx": ("onnx",),
+    "onnx": ("onnx", "onnxruntime"),
     "sweep": ("distributed", "cryptography"),
     "video": ("av",),
     "view": ("viser", "websockets"),

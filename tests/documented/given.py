@@ -10,6 +10,7 @@ from tests.documented.collecting import ROOT
 from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
 from tests.support.captures import capture
 from tests.support.hinged_humanoid import write_robot
+from tests.support.networks import QUADRUPED_SIZE, Mlp
 from tests.support.skins import skinned_glb
 
 _PROGRAM = ROOT / ".venv/bin/actuated_characters"
@@ -108,6 +109,17 @@ def _code(page: str, word: str) -> Callable[[Path], None]:
     return write
 
 
+def _policy(path: Path) -> None:
+    """A network that nearly always answers zero, with the description of the page."""
+    network = Mlp(QUADRUPED_SIZE, 12)
+    network.weights["w2"] *= 0.01
+    network.weights["b2"] *= 0.0
+    network.write(path)
+    page = (ROOT / "docs/policies.md").read_text(encoding="utf-8")
+    (description,) = re.findall(r"```yaml\n(.*?)```", page, flags=re.DOTALL)
+    path.with_suffix(".yaml").write_text(description, encoding="utf-8")
+
+
 def _copy_of(file: str) -> Callable[[Path], None]:
     return lambda path: shutil.copy(ROOT / file, path) and None
 
@@ -124,6 +136,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robot.urdf": _robot,
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
+    "my_policy.onnx": _policy,
     "dance.yaml": _timeline,
     "dance.takes": _takes,
     "body.glb": _body,

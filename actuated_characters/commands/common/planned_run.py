@@ -109,14 +109,16 @@ def _set_options(options: argparse.Namespace, controller: dict[str, object]) -> 
     """Set the controller's parameters of options."""
     for name in ("behaviour", "planner", "collision"):
         _set_option(name, getattr(options, name), controller)
-    if options.machine is None:
-        return
-    if options.behaviour not in (None, "state_machine"):
-        raise ConfigurationError(
-            f"--machine goes with --behaviour state_machine, not {options.behaviour}"
-        )
-    _set_option("machine", options.machine, controller)
-    _set_option("behaviour", "state_machine", controller)
+    for option, behaviour in (("machine", "state_machine"), ("onnx", "onnx")):
+        given = getattr(options, option)
+        if given is None:
+            continue
+        if options.behaviour not in (None, behaviour):
+            raise ConfigurationError(
+                f"--{option} goes with --behaviour {behaviour}, not {options.behaviour}"
+            )
+        _set_option(option, given, controller)
+        _set_option("behaviour", behaviour, controller)
 
 
 def _reference(options: argparse.Namespace) -> dict[str, object]:
@@ -125,7 +127,9 @@ def _reference(options: argparse.Namespace) -> dict[str, object]:
         name = getattr(options, kind)
         if name is not None:
             return {"reference": kind, kind: name}
-    reference = options.reference if options.cmd_vel is None else "steered"
+    plays_network = options.onnx is not None or options.behaviour == "onnx"
+    steered = "commanded" if plays_network else "steered"
+    reference = options.reference if options.cmd_vel is None else steered
     return {} if reference is None else {"reference": reference}
 
 

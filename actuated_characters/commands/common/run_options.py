@@ -47,13 +47,19 @@ def add_tracked(run: argparse.ArgumentParser) -> None:
         "--behaviour",
         ParameterChoices(_CONTROLLER, "behaviour"),
         help="track whatever comes (tracking, the default); be limp; go limp on a hard hit, and "
-        "get up; react to hits; or go through the states of a machine",
+        "get up; react to hits; go through the states of a machine; or play a network",
     )
     run.add_argument(
         "--machine",
         metavar="NAME",
         help="walk, or what else a state machine does by joint torques alone, steered by cmd_vel: "
         "a shipped one, such as walk, or a .yaml file (--behaviour state_machine)",
+    )
+    run.add_argument(
+        "--onnx",
+        metavar="FILE",
+        help="play a policy of another trainer (--behaviour onnx); what its metadata lack is said "
+        "in FILE.yaml for FILE.onnx: docs/policies.md",
     )
     add_choice(
         run,

@@ -53,7 +53,7 @@ def plan_velocities(plan: RunPlan, text: str) -> tuple[RunPlan, list[PlannedVelo
     """
     reference, rate = plan.reference, plan.simulation.rate_hz
     if not isinstance(reference, SteeredReference):
-        raise ConfigurationError("--cmd-vel steers; it goes with --reference steered")
+        raise ConfigurationError("--cmd-vel steers; it goes with --reference steered or commanded")
     commands = [_parse(part, rate) for part in text.split()]
     _check_times(plan, commands)
     commands, warnings = _allowed(plan, reference, commands)

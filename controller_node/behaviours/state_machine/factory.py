@@ -39,7 +39,9 @@ class MachineSettings(Settings):
 def _state_machine(character: Character, values: Values) -> BehaviourChoice:
     _check(character, values)
     kit = make_kit(character, values)
-    return BehaviourChoice(partial(StateMachine, kit), needs_contacts=True, makes_effort=True)
+    return BehaviourChoice(
+        partial(StateMachine, kit), needs_contacts=True, makes_effort=True, follows_motion=False
+    )
 
 
 def limited(motion: Motion, values: Values) -> Motion:

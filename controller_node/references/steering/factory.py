@@ -2,7 +2,12 @@
 
 from controller_node.references.base import REFERENCES, Motion
 from controller_node.references.clip import ClipReference
-from controller_node.references.steering.gait import Gait, cycle_of, standing_cycle
+from controller_node.references.steering.gait import (
+    Gait,
+    cycle_of,
+    standing_cycle,
+    still_gait,
+)
 from controller_node.references.steering.reference import SteeredReference
 from controller_node.references.steering.velocity import SteeringLimits
 from msgs_config.character.model import Character
@@ -28,12 +33,24 @@ def clips_of_gait(character: Character, gait: GaitSettings) -> list[str]:
     return expand_clips(character, gait.clips) or [gait.walk, gait.run]
 
 
-@REFERENCES.register("steered", GaitSettings, SteeringLimits)
-def _steered(character: Character, values: Values) -> Motion:
+@REFERENCES.register("commanded", SteeringLimits)
+def _commanded(character: Character, values: Values) -> Motion:
+    _check_base("commanded", character)
+    limits, rate = SteeringLimits.of(values), SharedSettings.of(values).rate
+    return Motion(SteeredReference(character, still_gait(character), limits, rate_hz=rate))
+
+
+def _check_base(reference: str, character: Character) -> None:
     if not character.layout.has_floating_base:
         raise ConfigurationError(
-            f"reference 'steered' needs a floating base; '{character.name}' is fixed to the world"
+            f"reference '{reference}' needs a floating base; '{character.name}' is fixed to the "
+            "world"
         )
+
+
+@REFERENCES.register("steered", GaitSettings, SteeringLimits)
+def _steered(character: Character, values: Values) -> Motion:
+    _check_base("steered", character)
     gait = GaitSettings.of(values)
     names = clips_of_gait(character, gait)
     clamped: list[str] = []

@@ -108,6 +108,14 @@ def standing_cycle(character: Character, walk: GaitCycle) -> GaitCycle:
     return GaitCycle(0.0, walk.period, positions, turns, tuple(cycles))
 
 
+def still_gait(character: Character) -> "Gait":
+    """The pose at rest at any speed: what it does to go on is not said."""
+    pose = rest_pose(character)
+    positions = np.array([pose.position] * 2)
+    still = GaitCycle(0.0, 1.0, positions, np.array([pose.orientations_xyzw] * 2), ())
+    return Gait(character.layout, [still, replace(still, stride=1.0)])
+
+
 def rest_pose(character: Character) -> GeneralizedPosition:
     """How a character rests, above the origin."""
     position: FloatArray = np.array(character.rest_position)

@@ -234,3 +234,16 @@ def test_it_brakes_at_another_rate_than_it_speeds_up() -> None:
     assert speeds[RATE] == pytest.approx(0.5)
     assert speeds[3 * RATE + RATE // 4] == pytest.approx(0.5)
     assert speeds[3 * RATE + RATE // 2 + 1] == 0.0
+
+
+def test_a_commanded_rest_pose_goes_where_it_is_told_to_whatever_the_character() -> None:
+    reference = steer(make("laikago", reference="commanded"), VelocityCommand(0, 0.5, 0.0, 0.2))
+
+    state = reference.sample(0.9)
+
+    np.testing.assert_array_equal(
+        state.configuration.position[6:], character("laikago").rest_position[6:]
+    )
+    speed, climb = np.linalg.norm(state.velocity[:2]), state.velocity[2]
+    assert abs(speed - 0.5) < 1e-3 and abs(climb) < 1e-3
+    assert abs(state.velocity[5] - 0.2) < 1e-3

@@ -1,0 +1,1 @@
+"""Networks of other trainers, in ONNX: from an observation to targets of joints."""

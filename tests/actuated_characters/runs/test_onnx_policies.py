@@ -1,0 +1,182 @@
+"""Networks in ONNX play as numpy says of the recorded states, and their runs repeat to the bit."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuated_characters.bags.recording import Recording, read_recording
+from actuated_characters.cli import main
+from actuated_characters.replay.replay import replay
+from actuated_characters.runs.plan import make_plan
+from actuated_characters.runs.planned.inputs import PlannedInputs
+from actuated_characters.runs.planned.velocities import plan_velocities
+from tests.support.networks import (
+    QUADRUPED,
+    QUADRUPED_JOINTS,
+    QUADRUPED_SIZE,
+    Gru,
+    Mlp,
+    describe,
+    quadruped,
+    with_history,
+)
+from tests.support.runs import run_plan, run_plan_here, summary_of
+
+RATE, HOLD = 200, 4
+DURATION = 0.4
+BEGIN = 0.1  # s, of the command
+FORWARD, LEFT, TURN = 0.15, 0.05, 0.2
+CLOSE = 1e-5  # rad: single precision
+FRAMES = 3
+
+
+def rotation(vector: Any) -> Any:
+    """The matrix of a rotation vector, by Rodrigues' formula."""
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def commanded(tick: int) -> Any:
+    """The velocity at a tick: it rises at 1.3 m/s^2 and 1.5 rad/s^2, the defaults, up to what is
+    wanted."""
+    time = max(tick / RATE - BEGIN, 0.0)
+    return np.array((min(FORWARD, 1.3 * time), min(LEFT, 1.3 * time), min(TURN, 1.5 * time)))
+
+
+def frame(recording: Recording, tick: int, last: Any) -> list[Any]:
+    """The present entries of each term."""
+    position, velocity = recording.position[tick], recording.velocity[tick]
+    names = list(recording.layout.dof_names)
+    joints = [names.index(joint) for joint in QUADRUPED_JOINTS]
+    return [
+        0.25 * velocity[3:6],
+        rotation(position[3:6]).T @ (0.0, 0.0, -1.0),
+        commanded(tick) * (2.0, 2.0, 0.25),
+        position[joints] - QUADRUPED["default_joint_pos"],
+        np.clip(velocity[joints], -4.0, 4.0) * 0.05,
+        last,
+    ]
+
+
+def plain(frames: list[list[Any]]) -> Any:
+    return np.concatenate(frames[-1])
+
+
+def terms_oldest_first(frames: list[list[Any]]) -> Any:
+    """Term by term, its frames; before the first one there were more of it."""
+    padded = ([frames[0]] * FRAMES + frames)[-FRAMES:]
+    return np.concatenate([each[row] for row in range(6) for each in padded])
+
+
+def frames_newest_first(frames: list[list[Any]]) -> Any:
+    """Frame by frame; before the first one there were zeros."""
+    nothing = [np.zeros_like(each) for each in frames[0]]
+    padded = ([nothing] * FRAMES + frames)[-FRAMES:]
+    return np.concatenate([term for each in padded[::-1] for term in each])
+
+
+NEWEST = {"history_order": "newest_first", "history_by": "frame", "history_start": "zeros"}
+KINDS: dict[str, tuple[Callable[[], Any], dict[str, Any], Callable[[list[list[Any]]], Any]]] = {
+    "mlp": (lambda: Mlp(QUADRUPED_SIZE, 12), quadruped(), plain),
+    "history": (lambda: Mlp(FRAMES * QUADRUPED_SIZE, 12), with_history(FRAMES), terms_oldest_first),
+    "frames": (
+        lambda: Mlp(FRAMES * QUADRUPED_SIZE, 12),
+        with_history(FRAMES, **NEWEST),
+        frames_newest_first,
+    ),
+    "gru": (lambda: Gru(QUADRUPED_SIZE, 12), quadruped(), plain),
+}
+
+
+def options(kind: str, folder: Path) -> list[str]:
+    """The options of a run by a network that is written to a folder."""
+    make, description, _ = KINDS[kind]
+    file = make().write(folder / "policy.onnx")
+    describe(file, description)
+    return [
+        *("--onnx", str(file), "--character", "laikago", "--duration", str(DURATION)),
+        *("--cmd-vel", f"{FORWARD},{LEFT},{TURN}@{BEGIN}"),
+        *("--set", f"sim_node.rate:={RATE}", "--set", "controller_node.law:=pd"),
+    ]
+
+
+@pytest.fixture(scope="module", params=list(KINDS))
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def run(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of a kind of network, with a keyframe at 0.2 s."""
+    folder = tmp_path_factory.mktemp(kind)
+    given = [*options(kind, folder), "--set", "sim_node.keyframe_period:=0.2"]
+    given += ["--set", "sim_node.keyframe_budget:=100000"]
+    assert main(["run", "--in-process", *given, "--output", str(folder / "run")]) == 0
+    return folder / "run"
+
+
+def test_targets_are_what_numpy_says_of_the_recorded_states(kind: str, run: Path) -> None:
+    recording, (make, _, observation) = read_recording(run), KINDS[kind]
+    network, last, frames = make(), np.zeros(12), []
+    names = list(recording.layout.dof_names)
+    joints = [names.index(joint) for joint in QUADRUPED_JOINTS]
+    wanted = np.empty((len(recording.stamps_ns), 12))
+    for tick in range(0, len(wanted), HOLD):
+        frames.append(frame(recording, tick, last))
+        last = network(observation(frames))
+        wanted[tick : tick + HOLD] = QUADRUPED["default_joint_pos"] + 0.25 * last
+
+    np.testing.assert_allclose(recording.reference_position[:, joints], wanted, rtol=0, atol=CLOSE)
+    assert np.ptp(wanted, axis=0).min() > 0.01  # rad: each of them moves
+
+
+def test_efforts_are_those_of_a_pd_law_with_the_policys_own_gains(run: Path) -> None:
+    recording = read_recording(run)
+    names = list(recording.layout.dof_names)
+    joints = [names.index(joint) for joint in QUADRUPED_JOINTS]
+    errors = recording.reference_position - recording.position
+    damping = np.array(QUADRUPED["joint_damping"])
+    efforts = 60.0 * errors[:-1, joints] - damping * recording.velocity[:-1, joints]
+    inside = np.abs(efforts) < 20.0  # N m: below the limits of the URDF
+    assert inside.mean() > 0.9
+    np.testing.assert_allclose(recording.effort[:, joints][inside], efforts[inside], atol=1e-9)
+    assert not recording.effort[:, :6].any()
+
+
+def test_a_fork_in_the_middle_ends_as_the_run_did(run: Path) -> None:
+    output = run.with_name("fork")
+    assert main(["fork", str(run), "--at", "0.3", "--output", str(output)]) == 0
+    part, whole = read_recording(output), read_recording(run)
+    count = len(part.stamps_ns)
+    assert count == round(0.2 * RATE) + 1  # from the keyframe on
+    for name in ("position", "velocity", "reference_position"):
+        assert getattr(part, name).tobytes() == getattr(whole, name)[-count:].tobytes(), name
+    assert replay([whole]).identical
+
+
+@pytest.mark.slow
+def test_over_topics_and_in_a_replay_of_the_controller_it_is_the_same_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options("gru", tmp_path)
+    given = {"behaviour": "onnx", "onnx": str(tmp_path / "policy.onnx"), "law": "pd"}
+    plan = make_plan("laikago", DURATION, {"reference": "commanded"}, {"rate": RATE}, given)
+    plan, velocities = plan_velocities(plan, f"{FORWARD},{LEFT},{TURN}@{BEGIN}")
+    inputs = PlannedInputs(velocities=velocities)
+    for name in ("once", "twice"):
+        run_plan_here(plan, tmp_path / name, inputs)
+
+    run_plan(plan, tmp_path / "sent", inputs=inputs)
+
+    hashes = [summary_of(tmp_path / name)["state_hash"] for name in ("once", "twice", "sent")]
+    assert hashes == hashes[:1] * 3
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    for place in ("controller", "simulator"):
+        assert main(["replay", str(tmp_path / "sent"), "--through-topics", place]) == 0
