@@ -15,6 +15,7 @@ from actuated_characters.commands.common.completion import add_names, complete
 from actuated_characters.commands.common.interruption import raise_at_signals, was_interrupted
 from actuated_characters.commands.common.overview import print_overview
 from actuated_characters.commands.compare import add_compare
+from actuated_characters.commands.explain.command import add_explain
 from actuated_characters.commands.export import add_export
 from actuated_characters.commands.fork import add_fork
 from actuated_characters.commands.info import add_info
@@ -67,7 +68,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in (
         *(add_run, add_play, add_view, add_fork, add_render, add_replay, add_info, add_report),
-        *(add_compare, add_export, add_motion, add_author, add_take, add_train, add_sweep),
+        *(add_compare, add_export, add_motion, add_author, add_take, add_train, add_explain),
+        add_sweep,
     ):
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them

@@ -6,6 +6,8 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from tests.documented.collecting import ROOT
 from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
 from tests.support.captures import capture
@@ -120,6 +122,21 @@ def _policy(path: Path) -> None:
     path.with_suffix(".yaml").write_text(description, encoding="utf-8")
 
 
+def _trace(path: Path) -> None:
+    """Three decisions of a robot that stands still, as its trainer would log them."""
+    default = [0.0] * 8 + [-0.7] * 4
+    states = {
+        "root_quat_wxyz": (1.0, 0.0, 0.0, 0.0),
+        "root_ang_vel_b": (0.0, 0.0, 0.0),
+        "command": (0.5, 0.0, 0.0),
+        "joint_pos": default,
+        "joint_vel": [0.0] * 12,
+        "last_action": [0.0] * 12,
+        "obs": [0.0] * 3 + [0.0, 0.0, -1.0] + [1.0, 0.0, 0.0] + [0.0] * 36,
+    }
+    np.savez(path, **{key: np.tile(row, (3, 1)) for key, row in states.items()})
+
+
 def _copy_of(file: str) -> Callable[[Path], None]:
     return lambda path: shutil.copy(ROOT / file, path) and None
 
@@ -137,6 +154,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
     "my_policy.onnx": _policy,
+    "trace.npz": _trace,
     "dance.yaml": _timeline,
     "dance.takes": _takes,
     "body.glb": _body,

@@ -12,11 +12,13 @@ from controller_node.behaviours.onnx_policy.check import (
     check_size,
     ticks_of,
 )
+from controller_node.behaviours.onnx_policy.description import Description
 from controller_node.behaviours.onnx_policy.file import description_path, read_description
 from controller_node.behaviours.onnx_policy.policy import OnnxPolicy, PolicyKit
 from controller_node.behaviours.onnx_policy.session import Network
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.factory import MotionSettings
+from msgs_config.arrays import IntArray
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
@@ -68,20 +70,30 @@ def make_kit(path: Path, character: Character, rate_hz: int) -> PolicyKit:
     Raises:
         ConfigurationError: a file is missing or wrong, or does not fit the character or the rate.
     """
+    network, policy = read_policy(path, character)
+    return PolicyKit(
+        network=network,
+        policy=policy,
+        layout=character.layout,
+        entries=joint_entries(policy, character),
+        hold=ticks_of(network, policy, rate_hz),
+        rate_hz=rate_hz,
+    )
+
+
+def read_policy(path: Path, character: Character) -> tuple[Network, Description]:
+    """A network and its description, for a character. Raises as `make_kit`."""
     network = Network(path)
     policy = read_description(network)
     check_joints(network, policy, character)
     check_size(network, policy)
     check_answer(network, policy)
-    entries = [character.layout.joint(joint).start for joint in policy.joints]
-    return PolicyKit(
-        network=network,
-        policy=policy,
-        layout=character.layout,
-        entries=np.array(entries, dtype=np.intp),
-        hold=ticks_of(network, policy, rate_hz),
-        rate_hz=rate_hz,
-    )
+    return network, policy
+
+
+def joint_entries(policy: Description, character: Character) -> IntArray:
+    """The entries (m,) of a policy's joints among a character's."""
+    return np.array([character.layout.joint(joint).start for joint in policy.joints], dtype=np.intp)
 
 
 def policy_files(values: Values) -> dict[str, Path]:

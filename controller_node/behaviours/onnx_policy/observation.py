@@ -1,10 +1,11 @@
 """An observation, made of its terms: each clipped and scaled, with those of decisions before."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from controller_node.behaviours.onnx_policy.description import History, UsedTerm
+from controller_node.behaviours.onnx_policy.description import Description, History, UsedTerm
 from controller_node.behaviours.onnx_policy.terms import Situation
 from msgs_config.arrays import FloatArray, SingleArray
 
@@ -38,9 +39,32 @@ class ObservationHistory:
             ]
         for row, now in enumerate(frame):
             self._past[row] = np.concatenate((self._past[row][1:], now[np.newaxis]))
-        ordered = self._past
-        if self._history.order == "newest_first":
-            ordered = [past[::-1] for past in ordered]
-        if self._history.by == "frame":
-            ordered = [np.concatenate(ordered, axis=1)]
-        return np.concatenate([past.ravel() for past in ordered]).astype(np.float32)
+        return arranged(self._past, self._history).astype(np.float32)
+
+
+def arranged(past: Sequence[FloatArray], history: History) -> FloatArray:
+    """The entries (o,) of all terms, of each one's frames (f, s), the oldest first."""
+    if history.order == "newest_first":
+        past = [frames[::-1] for frames in past]
+    if history.by == "frame":
+        past = [np.concatenate(past, axis=1)]
+    return np.concatenate([frames.ravel() for frames in past])
+
+
+class Entry(NamedTuple):
+    """What an entry of an observation is."""
+
+    used: UsedTerm
+    column: int  # among the term's own entries
+    age: int  # decisions ago
+
+
+def entries_of(policy: Description) -> list[Entry]:
+    """What each entry of a policy's observation is, in their order."""
+    every, codes, history = list[Entry](), [], policy.history
+    for used in policy.terms:
+        size, first = len(used.labels), len(every)
+        for age in range(used.history - 1, -1, -1):
+            every += [Entry(used, column, age) for column in range(size)]
+        codes.append(np.arange(first, len(every), dtype=float).reshape(used.history, size))
+    return [every[int(code)] for code in arranged(codes, history)]
