@@ -15,11 +15,12 @@ HIDDEN = 16
 
 @dataclass
 class Mlp:
-    """`tanh(x W1 + b1) W2 + b2`."""
+    """`tanh(x W1 + b1) W2 + b2`; other inputs, by name with their shapes, change nothing."""
 
     inputs: int
     outputs: int
     seed: int = 0
+    others: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     weights: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -45,7 +46,7 @@ class Mlp:
             helper.make_node("MatMul", ["c", "w2"], ["d"]),
             helper.make_node("Add", ["d", "b2"], ["actions"]),
         ]
-        ends = {"obs": (1, self.inputs)}, {"actions": (1, self.outputs)}
+        ends = {"obs": (1, self.inputs), **self.others}, {"actions": (1, self.outputs)}
         return _write(path, nodes, *ends, self.weights, metadata)
 
 

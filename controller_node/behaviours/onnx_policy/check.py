@@ -48,6 +48,16 @@ def check_joints(network: Network, policy: Description, character: Character) ->
             )
 
 
+def check_motion(network: Network, policy: Description) -> None:
+    """Raise ConfigurationError if a policy is told of a motion that is in the network itself."""
+    told = next((used.name for used in policy.terms if used.term.needs_motion), None)
+    if told is not None and STEP_INPUT in network.inputs:
+        raise ConfigurationError(
+            f"{network.path}: the term '{told}' is of a motion in the network itself (its input "
+            f"'{STEP_INPUT}'); such policies cannot be played yet"
+        )
+
+
 def check_size(network: Network, policy: Description) -> None:
     """Raise ConfigurationError if the observation has not as many entries as the network takes."""
     size = network.inputs[network.observation][-1]

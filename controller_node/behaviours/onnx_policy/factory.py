@@ -9,6 +9,7 @@ from controller_node.behaviours.base import BEHAVIOURS, BehaviourChoice
 from controller_node.behaviours.onnx_policy.check import (
     check_answer,
     check_joints,
+    check_motion,
     check_size,
     ticks_of,
 )
@@ -86,6 +87,7 @@ def read_policy(path: Path, character: Character) -> tuple[Network, Description]
     network = Network(path)
     policy = read_description(network)
     check_joints(network, policy, character)
+    check_motion(network, policy)
     check_size(network, policy)
     check_answer(network, policy)
     return network, policy

@@ -33,6 +33,7 @@ _KEYS = (
 _TERM_KEYS = ("term", "scale", "clip", "history_length", "period", "quaternion")
 _ALIASES = {"joint_vel": "joint_vel_rel", "actions": "last_action", "phase": "gait_phase"}
 _EITHER = "joint_pos"
+_UNPLAYED = ("motion_anchor_pos_b", "motion_anchor_ori_b")
 _MOST_FRAMES = 1000
 
 
@@ -173,6 +174,11 @@ def _term(reader: _Reader, observations: MappingReader, name: str) -> UsedTerm:
         raise ConfigurationError(
             f"{reader.place}: {own.prefix[:-1]} may be the position itself or what it is off the "
             "default pose; write joint_pos_abs or joint_pos_rel"
+        )
+    if wanted in _UNPLAYED:
+        raise ConfigurationError(
+            f"{reader.place}: the term '{wanted}' is where a motion has its anchor body; policies "
+            "that are told of it cannot be played yet"
         )
     if (kind := _ALIASES.get(wanted, wanted)) not in TERMS:
         wrong = one_of("term", wanted, list(TERMS), observations.prefix)

@@ -9,10 +9,12 @@ import pytest
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.cli import main
+from actuated_characters.replay.players.controller_parameters import changed_files
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.velocities import plan_velocities
+from msgs_config.character.loading import load_character
 from tests.support.networks import (
     QUADRUPED,
     QUADRUPED_JOINTS,
@@ -180,3 +182,65 @@ def test_over_topics_and_in_a_replay_of_the_controller_it_is_the_same_run(
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     for place in ("controller", "simulator"):
         assert main(["replay", str(tmp_path / "sent"), "--through-topics", place]) == 0
+
+
+def test_a_fixed_base_at_half_its_strength(tmp_path: Path) -> None:
+    network = Mlp(3, 1, others={"time_step": (1, 1)})
+    file = network.write(tmp_path / "policy.onnx")
+    terms = {"joint_pos_abs": {}, "joint_vel": {"scale": 0.1}, "last_action": {}}
+    given = {"joint_names": ["hinge"], "default_joint_pos": 0.2, "action_offset": 0.5}
+    describe(file, quadruped(**given, joint_damping=3.0, action_clip=0.4, observations=terms))
+    settings = {"behaviour": "onnx", "onnx": str(file), "law": "pd", "strength.hinge": 0.5}
+
+    run_plan_here(make_plan("pendulum", 0.3, {}, {"rate": RATE}, settings), tmp_path / "run")
+
+    recording, last = read_recording(tmp_path / "run"), 0.0
+    position, velocity = recording.position[:, 0], recording.velocity[:, 0]
+    targets = np.empty(len(position))
+    for tick in range(0, len(position), HOLD):
+        seen = np.array((position[tick], 0.1 * velocity[tick], last))
+        last = float(np.clip(network(seen)[0], -0.4, 0.4))
+        targets[tick : tick + HOLD] = 0.5 + 0.25 * last
+    np.testing.assert_allclose(recording.reference_position[:, 0], targets, rtol=0, atol=CLOSE)
+    wanted = 0.5 * (60.0 * (targets - position) - 3.0 * velocity)
+    np.testing.assert_allclose(recording.effort[:, 0], wanted[:-1], rtol=0, atol=1e-3)
+
+
+def test_held_joints_follow_the_reference_of_which_the_policy_is_told(tmp_path: Path) -> None:
+    layout = load_character("humanoid").layout
+    hinges = ["left_knee", "right_elbow"]
+    held = [name for name in layout.actuated_joint_names if name not in hinges]
+    network = Mlp(7, 2)
+    file = network.write(tmp_path / "policy.onnx")
+    terms: dict[str, Any] = {"motion_command": {}, "projected_gravity": {}}
+    given = {"joint_names": hinges, "held_joints": held, "default_joint_pos": [-0.3, 0.4]}
+    describe(file, quadruped(**given, joint_damping=3.0, observations=terms))
+    settings = {"behaviour": "onnx", "onnx": str(file)}
+    clip = {"reference": "clip", "clip": "walk"}
+
+    run_plan_here(make_plan("humanoid", 0.2, clip, {"rate": RATE}, settings), tmp_path / "run")
+    run_plan_here(make_plan("humanoid", 0.2, clip, {"rate": RATE}, {}), tmp_path / "walk")
+
+    found, walk = read_recording(tmp_path / "run"), read_recording(tmp_path / "walk")
+    joints = [layout.joint(name).start for name in hinges]
+    others = np.setdiff1d(np.arange(layout.size), joints)
+    np.testing.assert_array_equal(
+        found.reference_position[:, others], walk.reference_position[:, others]
+    )
+    wanted = np.empty((len(found.stamps_ns), 2))
+    for tick in range(0, len(wanted), HOLD):
+        motion = walk.reference_position[tick, joints], walk.reference_velocity[tick, joints]
+        gravity = rotation(found.position[tick, 3:6]).T @ (0.0, 0.0, -1.0)
+        answer = network(np.concatenate((*motion, gravity)))
+        wanted[tick : tick + HOLD] = (-0.3, 0.4) + 0.25 * answer
+    np.testing.assert_allclose(found.reference_position[:, joints], wanted, rtol=0, atol=CLOSE)
+
+
+def test_a_description_that_has_changed_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [*options("mlp", tmp_path), "--output", str(tmp_path / "run")]
+    assert main(["run", "--in-process", *given]) == 0
+    describe(tmp_path / "policy.onnx", quadruped(action_scale=0.2))
+    (said,) = changed_files(read_recording(tmp_path / "run"))
+    assert said == f"{tmp_path}/policy.yaml is not the file that it was: its content differs"

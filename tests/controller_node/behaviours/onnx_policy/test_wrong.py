@@ -71,6 +71,10 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         observed(base_quat={}),
         "observations.base_quat.quaternion is None; it must be .* xyzw or wxyz",
     ),
+    "anchor of a motion": (
+        observed(motion_anchor_ori_b={}),
+        "the term 'motion_anchor_ori_b' is where a motion has its anchor body; .* cannot be played",
+    ),
     "no period of a gait": (observed(gait_phase={}), "observations.gait_phase.period is None"),
     "scale of a term": (
         observed(base_ang_vel={"scale": [1.0, 2.0]}),
@@ -163,6 +167,21 @@ def test_ball_joints_and_a_fixed_base_are_refused(file: Path, tmp_path: Path) ->
     assert f"joint '{ball}' of 'humanoid' is a ball joint" in refused(file, "humanoid")
     describe(file, quadruped(joint_names=["hinge"], **given))
     assert "the term 'base_ang_vel' needs a floating base" in refused(file, "pendulum")
+
+
+def test_a_motion_in_the_network_is_refused(tmp_path: Path) -> None:
+    network = Mlp(QUADRUPED_SIZE + 12, 12, others={"time_step": (1, 1)})
+    file = network.write(tmp_path / "policy.onnx")
+    describe(file, observed(motion_joint_pos={}))
+    assert "is of a motion in the network itself (its input 'time_step')" in refused(file)
+
+
+def test_an_input_that_nothing_feeds_is_named(tmp_path: Path) -> None:
+    network = Mlp(QUADRUPED_SIZE, 12, others={"height_map": (1, 9)})
+    file = network.write(tmp_path / "policy.onnx")
+    describe(file, quadruped())
+    said = "its input 'height_map' is fed by no output; say by which in 'recurrent'"
+    assert said in refused(file)
 
 
 def run(file: Path, *options: str) -> int:
