@@ -145,7 +145,7 @@ class EditorPanel:
         gui, session = self._gui, self._session
         with gui.add_folder("Events", expand_by_default=False):
             self._event: Any = gui.add_dropdown("There are", (_NONE,))
-            on(self._actions, self._event, lambda _: self.act(self._choose_event))
+            on(self._actions, self._event, lambda line: self.act(partial(self._choose_event, line)))
             change = {
                 "Go": self._go_to_event,
                 "Move here": self._move_event,
@@ -160,12 +160,15 @@ class EditorPanel:
         self.chosen.add(*self._form.event())
 
     def _listed_event(self) -> Item | None:
-        options = list(self._event.options)
-        value = self._event.value
-        return self._items[options.index(value)] if self._items and value in options else None
+        """What is chosen, else what the list shows."""
+        return self.chosen.event or self._event_of(self._event.value)
 
-    def _choose_event(self) -> None:
-        self.chosen.choose(self._listed_event())
+    def _event_of(self, line: str) -> Item | None:
+        options = list(self._event.options)
+        return self._items[options.index(line)] if self._items and line in options else None
+
+    def _choose_event(self, line: str) -> None:
+        self.chosen.choose(self._event_of(line))
 
     def _move_event(self) -> None:
         if (item := self._listed_event()) is not None:

@@ -20,6 +20,8 @@ from tests.support.ros import wait_until
 HUMANOID = character("humanoid")
 WRIST = [link.name for link in HUMANOID.links].index("right_wrist")
 
+PUSH = {"at": 2.0, "link": "chest", "force": [0.0, 200.0, 0.0]}
+
 
 @pytest.fixture
 def session(tmp_path: Path) -> Session:
@@ -140,6 +142,26 @@ def test_an_event_of_a_form_is_added_marked_and_deleted(page: EditorPage, sessio
     click(page, "Delete event")
     click(page, "Delete event")
     assert "pushes" not in session.document.content
+
+
+def test_the_list_may_be_redrawn_before_a_choice_in_it_is_heard(
+    page: EditorPage, session: Session
+) -> None:
+    for track, event in (("limp", {"at": 1.0, "until": 2.0}), ("pushes", PUSH)):
+        page._panel.chosen.add(track, event)
+    page.step(0.0)
+    listed = page._panel._event
+    limp = next(line for line in listed.options if line.startswith("limp"))
+    listed._impl.value = limp
+    for update in listed._impl.update_cb:
+        _run(update)
+    page._panel.show()  # which has the push in the list, as it is still chosen
+
+    session.playback.seek(3.0)
+    click(page, "Move here")
+
+    assert session.document.content["limp"] == [{"at": 3.0, "until": 4.0}]
+    assert session.document.content["pushes"] == [PUSH]
 
 
 def test_what_lasts_no_time_is_refused_once_it_is_added(page: EditorPage, session: Session) -> None:
