@@ -21,6 +21,8 @@ class Mlp:
     outputs: int
     seed: int = 0
     others: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    motion: Mapping[str, Any] = field(default_factory=dict)
+    """Outputs by time step: tables (steps, ...), as whole_body_tracking's exporter adds them."""
     weights: dict[str, Any] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -46,8 +48,20 @@ class Mlp:
             helper.make_node("MatMul", ["c", "w2"], ["d"]),
             helper.make_node("Add", ["d", "b2"], ["actions"]),
         ]
-        ends = {"obs": (1, self.inputs), **self.others}, {"actions": (1, self.outputs)}
-        return _write(path, nodes, *ends, self.weights, metadata)
+        inputs = {"obs": (1, self.inputs), **self.others}
+        outputs = {"actions": (1, self.outputs)}
+        constants = dict(self.weights)
+        for name, table in self.motion.items():
+            inputs["time_step"], outputs[name] = (1, 1), (1, *table.shape[1:])
+            constants[f"{name} table"] = table.astype(np.float32)
+            nodes.append(helper.make_node("Gather", [f"{name} table", "step"], [name]))
+        if self.motion:
+            constants["axis"] = np.array([0], np.int64)
+            nodes.insert(
+                0, helper.make_node("Cast", ["time_step"], ["whole"], to=TensorProto.INT64)
+            )
+            nodes.insert(1, helper.make_node("Squeeze", ["whole", "axis"], ["step"]))
+        return _write(path, nodes, inputs, outputs, constants, metadata)
 
 
 @dataclass

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from controller_node.behaviours.onnx_policy.description import Description, UsedTerm
+from controller_node.behaviours.onnx_policy.motion import Pose, TrackedMotion
 from controller_node.behaviours.onnx_policy.terms import Situation
 from msgs_config import files
 from msgs_config.arrays import FloatArray, IntArray
@@ -22,6 +23,7 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.geometry import rotations
 
 OBSERVATION = "obs"
+_NOWHERE = Pose(np.zeros(3), np.array((0.0, 0.0, 0.0, 1.0)))
 _ROTATION, _SPIN = "root_quat", "root_ang_vel"
 _SIZES = {  # of a row; 0: one a joint, -1: any
     OBSERVATION: -1,
@@ -53,6 +55,8 @@ _NEEDED: Mapping[str, tuple[str, ...]] = {  # by a term what it is made of, as k
     "last_action": ("last_action",),
     "motion_joint_pos": ("motion_joint_pos",),
     "motion_joint_vel": ("motion_joint_vel",),
+    "motion_anchor_pos_b": ("anchors",),  # no trace has these
+    "motion_anchor_ori_b": ("anchors",),
     "motion_command": ("motion_joint_pos", "motion_joint_vel"),
 }
 
@@ -92,11 +96,10 @@ class Trace:
             velocity[:, :3] = self._get("root_lin_vel_w", 3)
             spin = rotations.rotate(rotations.conjugate(turns), self._get("root_ang_vel_w", 3))
             velocity[:, 3:6] = self.arrays.get("root_ang_vel_b", spin)
-        wanted, wanted_velocity = position.copy(), velocity.copy()
         position[:, entries] = self._get("joint_pos", len(entries))
         velocity[:, entries] = self._get("joint_vel", len(entries))
-        wanted[:, entries] = self._get("motion_joint_pos", len(entries))
-        wanted_velocity[:, entries] = self._get("motion_joint_vel", len(entries))
+        wanted = self._get("motion_joint_pos", len(entries))
+        wanted_velocity = self._get("motion_joint_vel", len(entries))
         actions, commands = self._get("last_action", len(entries)), self._get("command", 3)
         times = self.arrays.get("time", policy.step_s * np.arange(len(rows))[:, np.newaxis])
         return [
@@ -108,8 +111,8 @@ class Trace:
                 default=policy.default,
                 last_action=actions[row],
                 command=tuple(commands[row].tolist()),
-                wanted_position=wanted[row],
-                wanted_velocity=wanted_velocity[row],
+                motion=TrackedMotion(wanted[row], wanted_velocity[row], _NOWHERE),
+                anchor=_NOWHERE,
             )
             for row in rows
         ]

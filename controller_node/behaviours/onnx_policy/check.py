@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from controller_node.behaviours.onnx_policy.description import Description
+from controller_node.behaviours.onnx_policy.motion import OUTPUTS
 from controller_node.behaviours.onnx_policy.session import STEP_INPUT, Network
 from msgs_config.arrays import SingleArray
 from msgs_config.character.layout import SCALAR
@@ -48,14 +49,23 @@ def check_joints(network: Network, policy: Description, character: Character) ->
             )
 
 
-def check_motion(network: Network, policy: Description) -> None:
-    """Raise ConfigurationError if a policy is told of a motion that is in the network itself."""
-    told = next((used.name for used in policy.terms if used.term.needs_motion), None)
-    if told is not None and STEP_INPUT in network.inputs:
+def check_motion(network: Network, policy: Description, character: Character) -> None:
+    """Raise ConfigurationError if a motion's anchor is no body of the character or the motion."""
+    links = [link.name for link in character.links]
+    if policy.anchor and policy.anchor not in links:
+        wrong = one_of("link", policy.anchor, links)
+        raise ConfigurationError(f"{network.path}: anchor_body_name: {wrong}")
+    if not policy.needs_motion or STEP_INPUT not in network.inputs:
+        return
+    missing = [name for name in OUTPUTS if name not in network.outputs]
+    if missing:
         raise ConfigurationError(
-            f"{network.path}: the term '{told}' is of a motion in the network itself (its input "
-            f"'{STEP_INPUT}'); such policies cannot be played yet"
+            f"{network.path}: it has a motion in itself (its input '{STEP_INPUT}'), but no output "
+            f"'{missing[0]}'"
         )
+    if policy.anchor and policy.anchor not in policy.motion_bodies:
+        wrong = one_of("body", policy.anchor, list(policy.motion_bodies))
+        raise ConfigurationError(f"{network.path}: anchor_body_name among body_names: {wrong}")
 
 
 def check_size(network: Network, policy: Description) -> None:

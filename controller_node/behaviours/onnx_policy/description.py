@@ -57,6 +57,8 @@ class Description:
     step_s: float  # of a decision
     terms: tuple[UsedTerm, ...]
     history: History
+    anchor: str  # a link; empty: no term needs one
+    motion_bodies: tuple[str, ...]  # those of the motion in a network, in its order
     recurrent: Mapping[str, str]  # an input of the network: the output that it is next time
 
     @property
@@ -65,11 +67,21 @@ class Description:
         return sum(term.size for term in self.terms)
 
     @property
+    def motion_body(self) -> int:
+        """The row of the anchor among the bodies of a motion in a network; 0 without one."""
+        return self.motion_bodies.index(self.anchor) if self.anchor else 0
+
+    @property
     def needs_command(self) -> bool:
         """Whether a term is a commanded velocity."""
         return any(used.term.needs_command for used in self.terms)
 
     @property
+    def needs_motion(self) -> bool:
+        """Whether a term is of a motion."""
+        return any(used.term.needs_motion for used in self.terms)
+
+    @property
     def follows_motion(self) -> bool:
         """Whether what joints do depends on the reference's poses."""
-        return bool(self.held_joints) or any(used.term.needs_motion for used in self.terms)
+        return bool(self.held_joints) or self.needs_motion

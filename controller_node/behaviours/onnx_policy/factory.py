@@ -20,6 +20,7 @@ from controller_node.behaviours.onnx_policy.session import Network
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.factory import MotionSettings
 from msgs_config.arrays import IntArray
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
@@ -72,6 +73,7 @@ def make_kit(path: Path, character: Character, rate_hz: int) -> PolicyKit:
         ConfigurationError: a file is missing or wrong, or does not fit the character or the rate.
     """
     network, policy = read_policy(path, character)
+    links = [link.name for link in character.links]
     return PolicyKit(
         network=network,
         policy=policy,
@@ -79,6 +81,8 @@ def make_kit(path: Path, character: Character, rate_hz: int) -> PolicyKit:
         entries=joint_entries(policy, character),
         hold=ticks_of(network, policy, rate_hz),
         rate_hz=rate_hz,
+        model=DynamicsModel(character) if policy.anchor else None,
+        anchor=links.index(policy.anchor) if policy.anchor else 0,
     )
 
 
@@ -87,7 +91,7 @@ def read_policy(path: Path, character: Character) -> tuple[Network, Description]
     network = Network(path)
     policy = read_description(network)
     check_joints(network, policy, character)
-    check_motion(network, policy)
+    check_motion(network, policy, character)
     check_size(network, policy)
     check_answer(network, policy)
     return network, policy

@@ -28,12 +28,18 @@ from msgs_config.mappings import MappingReader
 _KEYS = (
     *("joint_names", "held_joints", "default_joint_pos", "joint_stiffness", "joint_damping"),
     *("action_scale", "action_offset", "action_clip", "target_clip", "step_dt", "observations"),
-    *("history_order", "history_by", "history_start", "recurrent"),
+    *(
+        "history_order",
+        "history_by",
+        "history_start",
+        "recurrent",
+        "anchor_body_name",
+        "body_names",
+    ),
 )
 _TERM_KEYS = ("term", "scale", "clip", "history_length", "period", "quaternion")
 _ALIASES = {"joint_vel": "joint_vel_rel", "actions": "last_action", "phase": "gait_phase"}
 _EITHER = "joint_pos"
-_UNPLAYED = ("motion_anchor_pos_b", "motion_anchor_ori_b")
 _MOST_FRAMES = 1000
 
 
@@ -108,6 +114,7 @@ def _describe(reader: _Reader, network: Network) -> Description:
     if twice is not None:
         raise ConfigurationError(f"{reader.place}: joint_names: '{twice}' is named twice")
     default = reader.of_joints("default_joint_pos", "the pose of the joints at action 0, rad or m")
+    terms = _terms(reader)
     has_offset = reader.content.get("action_offset") is not None
     return Description(
         joints=joints,
@@ -120,14 +127,23 @@ def _describe(reader: _Reader, network: Network) -> Description:
         action_clip=reader.bounds("action_clip"),
         target_clip=_target_clip(reader),
         step_s=_step(reader),
-        terms=_terms(reader),
+        terms=terms,
         history=History(
             reader.choice("history_order", list(ORDERS)),
             reader.choice("history_by", list(GROUPINGS)),
             reader.choice("history_start", list(STARTS)),
         ),
+        anchor=_anchor(reader, terms),
+        motion_bodies=reader.names("body_names", "links", []),
         recurrent=_recurrent(reader, network),
     )
+
+
+def _anchor(reader: _Reader, terms: tuple[UsedTerm, ...]) -> str:
+    if not any(used.term.needs_anchor for used in terms):
+        return ""
+    reader.needed("anchor_body_name", "the link that a motion's place is said of")
+    return reader.text("anchor_body_name")
 
 
 def _step(reader: _Reader) -> float:
@@ -174,11 +190,6 @@ def _term(reader: _Reader, observations: MappingReader, name: str) -> UsedTerm:
         raise ConfigurationError(
             f"{reader.place}: {own.prefix[:-1]} may be the position itself or what it is off the "
             "default pose; write joint_pos_abs or joint_pos_rel"
-        )
-    if wanted in _UNPLAYED:
-        raise ConfigurationError(
-            f"{reader.place}: the term '{wanted}' is where a motion has its anchor body; policies "
-            "that are told of it cannot be played yet"
         )
     if (kind := _ALIASES.get(wanted, wanted)) not in TERMS:
         wrong = one_of("term", wanted, list(TERMS), observations.prefix)

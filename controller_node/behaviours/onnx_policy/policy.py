@@ -7,6 +7,12 @@ import numpy as np
 from controller_node.behaviours.base import BehaviourOutput, Mode, Observation, Phase
 from controller_node.behaviours.onnx_policy.check import initial_state
 from controller_node.behaviours.onnx_policy.description import Description
+from controller_node.behaviours.onnx_policy.motion import (
+    Placement,
+    Pose,
+    TrackedMotion,
+    motion_of,
+)
 from controller_node.behaviours.onnx_policy.observation import ObservationHistory, frame_of
 from controller_node.behaviours.onnx_policy.session import STEP_INPUT, Network
 from controller_node.behaviours.onnx_policy.terms import Situation
@@ -14,6 +20,7 @@ from controller_node.control_laws import GainArrays, scale_gains
 from controller_node.references.base import ReferenceState
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray, IntArray
+from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import GeneralizedPosition, JointLayout
 from msgs_config.errors import SimulationError
 
@@ -28,6 +35,21 @@ class PolicyKit:
     entries: IntArray  # (m,) of its joints, in its order
     hold: int  # ticks of a decision
     rate_hz: int
+    model: DynamicsModel | None = None  # says where the anchor is, where there is one
+    anchor: int = 0  # row of its link
+
+    @property
+    def plays_motion(self) -> bool:
+        """Whether the motion that it tracks is in the network itself."""
+        return self.policy.needs_motion and STEP_INPUT in self.network.inputs
+
+    def anchor_at(self, position: FloatArray) -> Pose | None:
+        """Where the anchor of a character at a position (n,) is; None without one."""
+        if self.model is None:
+            return None
+        self.model.update(position, np.zeros(len(position)))
+        places, turns = self.model.link_poses()
+        return Pose(places[self.anchor], turns[self.anchor])
 
 
 class JointTargets:
@@ -66,6 +88,7 @@ class OnnxPolicy:
         self._history = ObservationHistory(policy.terms, policy.history)
         self._action = np.zeros(len(policy.joints))
         self._state = initial_state(kit.network, policy)
+        self._place: Placement | None = None  # of the motion in the network
         self._target = JointTargets(kit.entries, policy.action_offset)
         self._gains: tuple[GainArrays, FloatArray, GainArrays] | None = None
         self._phase = Phase(Mode.TRACK, {"assistance": "none", "policy": kit.network.path.name})
@@ -80,9 +103,9 @@ class OnnxPolicy:
 
     def _decide(self, seen: Observation) -> None:
         policy, network = self._kit.policy, self._kit.network
-        observation = self._history.add(frame_of(policy.terms, self._situation(seen)))
         if STEP_INPUT in self._state:
             self._state[STEP_INPUT] = np.full_like(self._state[STEP_INPUT], self._count)
+        observation = self._history.add(frame_of(policy.terms, self._situation(seen)))
         answer, outputs = network.evaluate(observation, self._state)
         if not np.isfinite(answer).all():
             joint = policy.joints[int(np.flatnonzero(~np.isfinite(answer))[0])]
@@ -102,7 +125,7 @@ class OnnxPolicy:
         self._count += 1
 
     def _situation(self, seen: Observation) -> Situation:
-        course = seen.course
+        course, anchor = seen.course, self._kit.anchor_at(seen.position)
         command = (0.0, 0.0, 0.0) if course is None else (course.forward, course.left, course.turn)
         return Situation(
             time=seen.time,
@@ -112,9 +135,25 @@ class OnnxPolicy:
             default=self._kit.policy.default,
             last_action=self._action,
             command=command,
-            wanted_position=seen.now.configuration.position,
-            wanted_velocity=seen.now.velocity,
+            motion=self._motion(seen, anchor),
+            anchor=anchor,
         )
+
+    def _motion(self, seen: Observation, anchor: Pose | None) -> TrackedMotion:
+        """The reference's; or the network's, which begins where the character is, and faces."""
+        kit = self._kit
+        if not kit.plays_motion:
+            position = seen.now.configuration.position
+            joints = position[kit.entries], seen.now.velocity[kit.entries]
+            return TrackedMotion(*joints, kit.anchor_at(position))
+        # What it says of its motion does not depend on the observation.
+        _, outputs = kit.network.evaluate(np.zeros(kit.policy.size, np.float32), self._state)
+        motion = motion_of(outputs, kit.policy.motion_body)
+        if anchor is None or motion.anchor is None:
+            return motion
+        if self._place is None:
+            self._place = Placement.leading(motion.anchor, anchor)
+        return motion._replace(anchor=self._place.moved(motion.anchor))
 
     def _gains_of(self, seen: Observation) -> GainArrays:
         """The policy's own gains at the strengths in force, made where these change."""

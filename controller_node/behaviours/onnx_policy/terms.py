@@ -11,8 +11,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from controller_node.behaviours.onnx_policy.motion import Pose, TrackedMotion
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.geometry import scalars
+from msgs_config.geometry import rotations, scalars
 
 QUATERNIONS = ("xyzw", "wxyz")
 """The orders that the entries of a quaternion can have."""
@@ -31,8 +32,8 @@ class Situation(NamedTuple):
     default: FloatArray  # (m,) rad or m
     last_action: FloatArray  # (m,), zero before the first one
     command: tuple[float, float, float]  # m/s ahead, m/s and rad/s to the left
-    wanted_position: FloatArray  # (n,) of the reference
-    wanted_velocity: FloatArray  # (n,)
+    motion: TrackedMotion
+    anchor: Pose | None = None  # where the body is that a motion's anchor is to be
 
 
 class TermOptions(NamedTuple):
@@ -60,6 +61,7 @@ class Term:
     needs_quaternion: bool = False
     needs_command: bool = False  # that steers
     needs_motion: bool = False  # whose poses are followed
+    needs_anchor: bool = False  # that is a body of both the character and the motion
 
     def labels(self, joints: tuple[str, ...], options: TermOptions) -> list[str]:
         """What each of its entries is of: an axis, or a joint."""
@@ -165,12 +167,12 @@ def _last_action(seen: Situation, options: TermOptions) -> FloatArray:
 
 @_term("motion_joint_pos", "rad or m", joints=_EACH_JOINT, needs_motion=True)
 def _motion_joint_pos(seen: Situation, options: TermOptions) -> FloatArray:
-    return seen.wanted_position[seen.entries]
+    return seen.motion.position
 
 
 @_term("motion_joint_vel", "rad/s or m/s", joints=_EACH_JOINT, needs_motion=True)
 def _motion_joint_vel(seen: Situation, options: TermOptions) -> FloatArray:
-    return seen.wanted_velocity[seen.entries]
+    return seen.motion.velocity
 
 
 @_term(
@@ -182,3 +184,27 @@ def _motion_joint_vel(seen: Situation, options: TermOptions) -> FloatArray:
 def _motion_command(seen: Situation, options: TermOptions) -> FloatArray:
     wanted = (_motion_joint_pos(seen, options), _motion_joint_vel(seen, options))
     return np.concatenate(wanted)
+
+
+@_term("motion_anchor_pos_b", "m", axes=_XYZ, frame="anchor", needs_motion=True, needs_anchor=True)
+def _motion_anchor_pos_b(seen: Situation, options: TermOptions) -> FloatArray:
+    return _anchor(seen).position
+
+
+@_term(
+    "motion_anchor_ori_b",
+    "1",
+    axes=tuple(f"{of} of the motion's {axis}" for of in "xyz" for axis in "xy"),
+    frame="anchor",
+    needs_motion=True,
+    needs_anchor=True,
+)
+def _motion_anchor_ori_b(seen: Situation, options: TermOptions) -> FloatArray:
+    """The first two columns of a matrix, row by row (Zhou et al. 2019)."""
+    return rotations.matrix(_anchor(seen).xyzw)[:, :2].ravel()
+
+
+def _anchor(seen: Situation) -> Pose:
+    """The motion's anchor in the frame of the character's."""
+    assert seen.motion.anchor is not None and seen.anchor is not None
+    return seen.motion.anchor.seen_from(seen.anchor)

@@ -13,7 +13,7 @@ from typing import Any
 from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import MappingReader
 
-_NAMES = ("joint_names", "observation_names", "command_names")
+_NAMES = ("joint_names", "observation_names", "command_names", "body_names")
 _NUMBERS = ("default_joint_pos", "joint_stiffness", "joint_damping", "action_scale")
 _HISTORY = "observation_history_lengths"
 _RELATIVE = {"joint_pos": "joint_pos_rel"}  # those tasks name it so, and subtract the default pose
@@ -31,8 +31,9 @@ def from_metadata(metadata: Mapping[str, str]) -> dict[str, Any]:
     }
     if len(found.get("action_scale", ())) == 1:
         found["action_scale"] = found["action_scale"][0]
-    if "joint_names" in lists:
-        found["joint_names"] = lists["joint_names"]
+    found |= {name: lists[name] for name in ("joint_names", "body_names") if name in lists}
+    if metadata.get("anchor_body_name"):
+        found["anchor_body_name"] = metadata["anchor_body_name"]
     if "observation_names" in lists:
         commands = lists.get("command_names", [])
         found["observations"] = {

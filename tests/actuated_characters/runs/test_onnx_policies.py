@@ -25,6 +25,7 @@ from tests.support.networks import (
     quadruped,
     with_history,
 )
+from tests.support.rotation_matrices import about, matrices
 from tests.support.runs import run_plan, run_plan_here, summary_of
 
 RATE, HOLD = 200, 4
@@ -244,3 +245,64 @@ def test_a_description_that_has_changed_is_said(
     describe(tmp_path / "policy.onnx", quadruped(action_scale=0.2))
     (said,) = changed_files(read_recording(tmp_path / "run"))
     assert said == f"{tmp_path}/policy.yaml is not the file that it was: its content differs"
+
+
+def test_a_motion_in_the_network_begins_where_the_character_is_and_faces(tmp_path: Path) -> None:
+    rng, steps = np.random.default_rng(2), 11
+    turns = rng.normal(size=(steps, 2, 4))
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    motion = {
+        "joint_pos": rng.normal(size=(steps, 12)),
+        "joint_vel": rng.normal(size=(steps, 12)),
+        "body_pos_w": rng.normal(size=(steps, 2, 3)),
+        "body_quat_w": turns,  # wxyz
+    }
+    network = Mlp(24 + 3 + 6, 12, motion=motion)
+    metadata = {  # as whole_body_tracking's exporter writes it
+        "joint_names": ",".join(QUADRUPED_JOINTS),
+        "joint_stiffness": ",".join(["60.000"] * 12),
+        "joint_damping": ",".join(["2.000"] * 12),
+        "default_joint_pos": ",".join(["0.000"] * 8 + ["-0.700"] * 4),
+        "action_scale": ",".join(["0.250"] * 12),
+        "command_names": "motion",
+        "observation_names": "command,motion_anchor_pos_b,motion_anchor_ori_b",
+        "anchor_body_name": "chassis",
+        "body_names": "FR_hip_motor,chassis",
+    }
+    file = network.write(tmp_path / "policy.onnx", metadata)
+    describe(file, {"step_dt": 0.02})
+    settings = {"behaviour": "onnx", "onnx": str(file)}
+    placed = {"rate": RATE, "placement": [1.0, -2.0, 0.3, 0.8]}
+    placed |= {"keyframe_period": 0.1, "keyframe_budget": 100_000}
+
+    run_plan_here(make_plan("laikago", 0.2, {}, placed, settings), tmp_path / "run")
+
+    recording = read_recording(tmp_path / "run")
+    joints = [list(recording.layout.dof_names).index(joint) for joint in QUADRUPED_JOINTS]
+    places, turned = motion["body_pos_w"][:, 1], matrices(turns[:, 1][:, [1, 2, 3, 0]])
+    first = recording.position[0]
+    between = rotation(first[3:6]) @ turned[0].T
+    about_z = about(2, np.arctan2(between[1, 0], between[0, 0]))
+    wanted = np.empty((len(recording.stamps_ns), 12))
+    for tick in range(0, len(wanted), HOLD):
+        step, position = tick // HOLD, recording.position[tick]
+        own = rotation(position[3:6])
+        place = about_z @ (places[step] - places[0] * (1, 1, 0)) + first[:3] * (1, 1, 0)
+        observation = np.concatenate(
+            (
+                motion["joint_pos"][step],
+                motion["joint_vel"][step],
+                own.T @ (place - position[:3]),
+                (own.T @ about_z @ turned[step])[:, :2].ravel(),
+            )
+        )
+        pose = [0.0] * 8 + [-0.7] * 4
+        wanted[tick : tick + HOLD] = pose + 0.25 * network(observation)
+    np.testing.assert_allclose(recording.reference_position[:, joints], wanted, rtol=0, atol=CLOSE)
+
+    assert (
+        main(["fork", str(tmp_path / "run"), "--at", "0.15", "--output", str(tmp_path / "f")]) == 0
+    )
+    part = read_recording(tmp_path / "f")
+    assert len(part.stamps_ns) == round(0.1 * RATE) + 1  # from the keyframe on
+    assert part.position.tobytes() == recording.position[-len(part.stamps_ns) :].tobytes()

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from controller_node.behaviours.onnx_policy.motion import Pose, TrackedMotion
 from controller_node.behaviours.onnx_policy.terms import TERMS, Situation, TermOptions
 from tests.support.rotation_matrices import matrices
 
@@ -15,6 +16,11 @@ BODY = """
 </mujoco>
 """
 JOINTS = np.array([7, 6])  # entries of two hinges, in the policy's own order
+
+
+def pose(rng: np.random.Generator) -> Pose:
+    turn = rng.normal(size=4)
+    return Pose(rng.normal(size=3), turn / np.linalg.norm(turn))
 
 
 def situation(**changed: Any) -> Situation:
@@ -28,8 +34,8 @@ def situation(**changed: Any) -> Situation:
         "default": rng.normal(size=2),
         "last_action": rng.normal(size=2),
         "command": (0.5, -0.1, 0.3),
-        "wanted_position": rng.normal(size=8),
-        "wanted_velocity": rng.normal(size=8),
+        "motion": TrackedMotion(rng.normal(size=2), rng.normal(size=2), pose(rng)),
+        "anchor": pose(rng),
     }
     return Situation(**(given | changed))
 
@@ -67,13 +73,24 @@ def test_velocities_and_orientation_of_the_base_are_those_of_sensors() -> None:
 
 def test_joints_are_in_the_policys_order() -> None:
     seen = situation()
-    position, wanted = seen.position[[7, 6]], seen.wanted_position[[7, 6]]
+    position = seen.position[[7, 6]]
     np.testing.assert_array_equal(computed("joint_pos_abs", seen), position)
     np.testing.assert_array_equal(computed("joint_pos_rel", seen), position - seen.default)
     np.testing.assert_array_equal(computed("joint_vel_rel", seen), seen.velocity[[7, 6]])
     np.testing.assert_array_equal(computed("last_action", seen), seen.last_action)
-    both = np.concatenate((wanted, seen.wanted_velocity[[7, 6]]))
+    both = np.concatenate((seen.motion.position, seen.motion.velocity))
     np.testing.assert_array_equal(computed("motion_command", seen), both)
+
+
+def test_a_motions_anchor_is_seen_from_that_of_the_character() -> None:
+    seen = situation()
+    assert seen.motion.anchor is not None and seen.anchor is not None
+    wanted, own = matrices(seen.motion.anchor.xyzw), matrices(seen.anchor.xyzw)
+    place = own.T @ (seen.motion.anchor.position - seen.anchor.position)
+    np.testing.assert_allclose(computed("motion_anchor_pos_b", seen), place, atol=1e-12)
+    columns = (own.T @ wanted)[:, :2]
+    found = computed("motion_anchor_ori_b", seen).reshape(3, 2)
+    np.testing.assert_allclose(found, columns, atol=1e-12)
 
 
 @pytest.mark.parametrize(("time", "angle"), [(0.0, 0.0), (0.2, 90.0), (1.2, 180.0), (1.4, -90.0)])

@@ -73,7 +73,11 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "anchor of a motion": (
         observed(motion_anchor_ori_b={}),
-        "the term 'motion_anchor_ori_b' is where a motion has its anchor body; .* cannot be played",
+        "it has no 'anchor_body_name', the link that a motion's place is said of",
+    ),
+    "unknown anchor": (
+        observed(motion_anchor_ori_b={}) | {"anchor_body_name": "torso_link"},
+        "anchor_body_name: unknown link 'torso_link'; .*there are: chassis, ",
     ),
     "no period of a gait": (observed(gait_phase={}), "observations.gait_phase.period is None"),
     "scale of a term": (
@@ -169,11 +173,14 @@ def test_ball_joints_and_a_fixed_base_are_refused(file: Path, tmp_path: Path) ->
     assert "the term 'base_ang_vel' needs a floating base" in refused(file, "pendulum")
 
 
-def test_a_motion_in_the_network_is_refused(tmp_path: Path) -> None:
+def test_a_motion_in_the_network_must_be_whole(tmp_path: Path) -> None:
     network = Mlp(QUADRUPED_SIZE + 12, 12, others={"time_step": (1, 1)})
     file = network.write(tmp_path / "policy.onnx")
     describe(file, observed(motion_joint_pos={}))
-    assert "is of a motion in the network itself (its input 'time_step')" in refused(file)
+    assert (
+        "it has a motion in itself (its input 'time_step'), but no output 'joint_pos'"
+        in refused(file)
+    )
 
 
 def test_an_input_that_nothing_feeds_is_named(tmp_path: Path) -> None:
