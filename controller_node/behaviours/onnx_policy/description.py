@@ -64,7 +64,7 @@ class Description:
     @property
     def size(self) -> int:
         """Entries of the observation."""
-        return sum(term.size for term in self.terms)
+        return sum(int(term.size) for term in self.terms)
 
     @property
     def motion_body(self) -> int:

@@ -204,7 +204,7 @@ def test_the_options_of_rows_are_those_that_describe_a_run() -> None:
     """A new option of `run` is to be weighed: is it of the run, or of the command?"""
     assert row_options() == {
         **dict.fromkeys(("character", "clip", "keyframes", "timeline", "reference"), False),
-        **dict.fromkeys(("cmd-vel", "behaviour", "machine", "collision", "planner"), False),
+        **dict.fromkeys(("cmd-vel", "behaviour", "machine", "onnx", "collision", "planner"), False),
         **dict.fromkeys(("duration", "compression", "log-time"), False),
         **dict.fromkeys(("push", "throw", "sensor", "exclude"), True),
     }
