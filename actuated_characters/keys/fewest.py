@@ -3,11 +3,14 @@
 import numpy as np
 
 from actuated_characters.keys.goal import Goal, Keys, Loop, path_of
+from actuated_characters.keys.leading_back import all_led_back, rounded
 from actuated_characters.keys.samples import Samples, Tolerances, unrolled
 from actuated_characters.keys.thinning import Progress, Thinning
 from actuated_characters.keys.written import SHORTEST_GAP, FewestKeys, WrittenPath
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointLayout
+
+_DENSE = 30.0  # keys a second, with which it begins
 
 
 def fewest_keys(
@@ -21,11 +24,10 @@ def fewest_keys(
 ) -> FewestKeys:
     """Find few keys whose smooth path is within tolerances of a motion at each sample.
 
-    Keys begin at each frame. The least needed one is taken away while values and velocities, and
-    then times, of its neighbours make up for it: so poses are near the motion's and not quite on
-    it. Times are multiples of 1 ms, two of them at least half a frame apart, values of 0.1 mrad and
-    0.1 mm. Where a frame is so far from the next that the path does not reach it, there are keys
-    between frames, too.
+    Keys begin at each frame, or at some thirty a second, and where the path misses a sample. The
+    least needed one is taken away while values and rates, and then times, of its neighbours make up
+    for it: so poses are near the motion's and not quite on it. Times are multiples of 0.1 ms, two
+    that moved at least a frame apart, values of 0.1 mrad and 0.1 mm.
 
     The same motion gives the same keys.
 
@@ -41,9 +43,12 @@ def fewest_keys(
     coordinates = _coordinates(layout, samples, scale)
     goal = _goal(layout, samples, scale, bounds, loops=loops)
     keys = _keys_of_frames(goal, samples.times)
-    keys = Thinning(goal, keys, progress).thin()
     written = WrittenPath(layout, samples, coordinates, scale, bounds)
-    return written.corrected(goal, keys)
+    led = all_led_back(written, goal, keys)
+    thinning = Thinning(written, led.goal, led.keys, progress)
+    thinning.thin()
+    led = all_led_back(written, thinning.goal, rounded(thinning.goal, thinning.keys))
+    return written.plainest(led)
 
 
 def _of_entries(layout: JointLayout, tolerances: Tolerances) -> FloatArray:
@@ -73,7 +78,7 @@ def _goal(
         _coordinates(layout, samples, scale),
         layout.vector_starts,
         (bounds[0] / scale, bounds[1] / scale),
-        max(float(np.median(np.diff(samples.times))), SHORTEST_GAP),
+        max(2.0 * float(np.median(np.diff(samples.times))), SHORTEST_GAP),
     )
     if not loops:
         return goal
@@ -81,8 +86,10 @@ def _goal(
 
 
 def _keys_of_frames(goal: Goal, times: FloatArray) -> Keys:
-    """A key at each frame of samples (m,), and between two where the path needs it."""
-    is_key, states = np.arange(len(times)) % 2 == 0, goal.states(times)
+    """A key at each frame of samples (m,), or some a second, and more where the path needs it."""
+    stride = 2 * max(1, round(1.0 / (_DENSE * goal.spacing)))
+    is_key, states = np.arange(len(times)) % stride == 0, goal.states(times)
+    is_key[-1] = True
     while True:
         rows = np.flatnonzero(is_key[:-1] if goal.loop else is_key)
         keys = Keys(times[rows], states[rows])

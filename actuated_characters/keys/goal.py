@@ -8,22 +8,26 @@ import numpy as np
 from actuated_characters.keys.path_weights import path_values, path_weights
 from msgs_config.arrays import BoolArray, FloatArray, IntArray
 
-_REACH = 3  # keys on each side whose states or times a part of the path between keys depends on
+_REACH = 1  # key on each side that a part of the path between keys depends on
 
 
 @dataclass(frozen=True)
 class Keys:
-    """Keys at rising times: unrolled coordinates in tolerances, and their rates a second."""
+    """Keys at rising times: unrolled coordinates in tolerances, their rates, and those of these."""
 
     times: FloatArray  # (p,) s
-    states: FloatArray  # (p, 2, n)
+    states: FloatArray  # (p, 3, n)
+
+    def __getitem__(self, rows: slice) -> "Keys":
+        """Some of the keys, in order."""
+        return Keys(self.times[rows], self.states[rows])
 
     def without(self, index: int) -> "Keys":
         """All keys but one."""
         return Keys(np.delete(self.times, index), np.delete(self.states, index, axis=0))
 
     def inserted(self, time: float, state: FloatArray) -> "Keys":
-        """The keys with one more at a time in s, whose state is (2, n)."""
+        """The keys with one more at a time in s, whose state is (3, n)."""
         row = int(np.searchsorted(self.times, time))
         return Keys(np.insert(self.times, row, time), np.insert(self.states, row, state, axis=0))
 
@@ -57,11 +61,12 @@ class Goal:
         return lengths
 
     def states(self, times: FloatArray) -> FloatArray:
-        """The motion (p, 2, n) at times (p,) in s, and its rates."""
+        """The motion (p, 3, n) at times (p,) in s, its rates, and those of these."""
         rates = np.gradient(self.values, self.times, axis=0)
-        columns = np.concatenate((self.values, rates), axis=1).T
+        second_rates = np.gradient(rates, self.times, axis=0)
+        columns = np.concatenate((self.values, rates, second_rates), axis=1).T
         found = np.array([np.interp(times, self.times, column) for column in columns]).T
-        return found.reshape(len(times), 2, -1)
+        return found.reshape(len(times), 3, -1)
 
     def looped(self, loop: Loop) -> "Goal":
         """That of a loop, of the samples of one period."""
@@ -97,20 +102,19 @@ class Window:
     free: BoolArray  # (u,) whose state is free
     movable: BoolArray  # (u,) whose time is free, too
     times: FloatArray  # (u,) s
-    states: FloatArray  # (u, 2, n)
+    states: FloatArray  # (u, 3, n)
     copies: IntArray  # (e,) which key of the window stands at each place, in the order of time
     laps: FloatArray  # (e, 1) how many periods later
     rows: slice  # of the samples of the goal
 
 
-def open_window(goal: Goal, keys: Keys, chosen: Sequence[int], left_out: int | None) -> Window:
+def open_window(goal: Goal, keys: Keys, chosen: Sequence[int]) -> Window:
     """The window in which some keys, side by side, are free.
 
     Args:
         goal: Whose samples are looked at.
         keys: All keys.
         chosen: The first and the last of the free keys; of a loop they may be beyond its ends.
-        left_out: A key that is taken as if it were not there.
     """
     count, (first, last) = len(keys.times), chosen
     if goal.loop is None:
@@ -120,8 +124,6 @@ def open_window(goal: Goal, keys: Keys, chosen: Sequence[int], left_out: int | N
         if last - first + 1 + 2 * _REACH > count:  # all are free
             first, last = 0, count - 1
         places = np.arange(first - _REACH, last + _REACH + 1)
-    is_left_out = places % count == (-1 if left_out is None else left_out)
-    places = places[~is_left_out]
     window_keys, copies = np.unique(places % count, return_inverse=True)
     chosen_keys = np.arange(first, last + 1) % count
     free = np.isin(window_keys, chosen_keys)
@@ -137,8 +139,7 @@ def open_window(goal: Goal, keys: Keys, chosen: Sequence[int], left_out: int | N
         slice(0, 0),
     )
     times = placed_times(goal, window, window.times)
-    begin = times[0] if goal.loop is None and places[0] == 0 else times[1]
-    end = times[-1] if goal.loop is None and places[-1] == count - 1 else times[-2]
+    begin, end = times[0], times[-1]
     if goal.loop is not None and free.all():
         begin, end = 0.0, goal.loop.period
     rows = np.searchsorted(goal.times, [begin, end], side="left")
@@ -152,17 +153,17 @@ def placed_times(goal: Goal, window: Window, times: FloatArray) -> FloatArray:
 
 
 def window_weights(goal: Goal, window: Window, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weights (r, 2 u) of a window's keys at times (u,), and what is added to the path, (r, n)."""
+    """Weights (r, 3 u) of a window's keys at times (u,), and what is added to the path, (r, n)."""
     samples = goal.times[window.rows]
     placed = path_weights(placed_times(goal, window, times), samples)
     if goal.loop is None:
         return placed, np.zeros((len(samples), len(goal.bounds[0])))
     fold = (window.copies[:, np.newaxis] == np.arange(len(window.keys))).astype(float)
-    return placed @ np.kron(fold, np.eye(2)), placed[:, ::2] @ (window.laps * goal.loop.lap)
+    return placed @ np.kron(fold, np.eye(3)), placed[:, ::3] @ (window.laps * goal.loop.lap)
 
 
 def window_path(goal: Goal, window: Window, times: FloatArray, states: FloatArray) -> FloatArray:
-    """Values (r, n) of the path through a window's keys at times (u,) with states (u, 2, n)."""
+    """Values (r, n) of the path through a window's keys at times (u,) with states (u, 3, n)."""
     placed = states[window.copies]
     if goal.loop is not None:
         placed[:, 0] += window.laps * goal.loop.lap

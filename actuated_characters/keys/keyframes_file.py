@@ -52,10 +52,11 @@ def _text(
     indent = " " * (len(item) - len(item.lstrip(" -")))
     before: FloatArray | None = None
     poses = np.round(keyframes.configurations.position, _DIGITS)
-    velocities = keyframes.velocities
-    if velocities is None:
-        velocities = np.full_like(poses, np.nan)
-    for time, pose, velocity in zip(keyframes.times, poses, velocities, strict=True):
+    none = np.full_like(poses, np.nan)
+    rates = [
+        none if each is None else each for each in (keyframes.velocities, keyframes.accelerations)
+    ]
+    for time, pose, *own in zip(keyframes.times, poses, *rates, strict=True):
         lines.append(f"{item}: {_number(float(time), 6)}")
         changed = [
             joint
@@ -63,9 +64,10 @@ def _text(
             if before is None or (pose[joint.entries] != before[joint.entries]).any()
         ]
         lines += _mapping(f"{indent}pose: ", changed, pose)
-        moving = [joint for joint in layout.joints if not np.isnan(velocity[joint.entries]).any()]
-        if moving:
-            lines += _mapping(f"{indent}velocity: ", moving, velocity)
+        for key, rate in zip(("velocity", "acceleration"), own, strict=True):
+            moving = [joint for joint in layout.joints if not np.isnan(rate[joint.entries]).any()]
+            if moving:
+                lines += _mapping(f"{indent}{key}: ", moving, rate)
         before = pose
     return "\n".join(lines) + "\n"
 

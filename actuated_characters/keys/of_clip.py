@@ -36,6 +36,14 @@ class KeyedClip:
         """Keys for each frame."""
         return len(self.found.keyframes.times) / len(self.clip.times)
 
+    @property
+    def numbers(self) -> float:
+        """Values, velocities and accelerations of all keys for each number of the frames."""
+        keyframes = self.found.keyframes
+        rates = (keyframes.velocities, keyframes.accelerations)
+        own = sum(int((~np.isnan(each)).sum()) for each in rates if each is not None)
+        return (keyframes.configurations.position.size + own) / self.clip.motion.position.size
+
 
 def keys_of_clip(
     clip: MotionClip, tolerances: Tolerances, progress: Progress = lambda share: None

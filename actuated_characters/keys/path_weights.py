@@ -2,27 +2,24 @@
 
 import numpy as np
 
-from controller_node.references.curve import QUINTIC, around_knots, cubic_accelerations
+from controller_node.references.curve import QUINTIC
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import fixed_order
 
 
 def path_values(keys: FloatArray, states: FloatArray, times: FloatArray) -> FloatArray:
-    """Values (m, n) at m times of the path through keys that have values and rates (p, 2, n).
+    """Values (m, n) at m times of the path through keys that have states (p, 3, n).
 
     The path is that of `controller_node.references.curve.smooth_knots` with these rates, which is
-    linear in them and in the values.
+    linear in the states.
 
     Args:
         keys: Times (p,) of two keys or more, rising, in s.
-        states: Of each key the value, of any unit, and its rate, a second.
+        states: Of each key the value, of any unit, its rate a second, and the rate of that.
         times: Times (m,) in s, from the first key to the last.
     """
-    values, rates = states[:, 0], states[:, 1]
+    values, rates, accelerations = states[:, 0], states[:, 1], states[:, 2]
     durations = np.diff(keys)
-    slopes = np.diff(values, axis=0) / durations[:, np.newaxis]
-    around = around_knots(slopes, durations[:, np.newaxis], loops=False)
-    accelerations = cubic_accelerations(*around, rates)
     segments = np.searchsorted(keys, times, side="right").clip(1, len(durations)) - 1
     lasts = durations[segments]
     u = ((times - keys[segments]) / lasts).clip(0.0, 1.0)
@@ -43,6 +40,6 @@ def path_values(keys: FloatArray, states: FloatArray, times: FloatArray) -> Floa
 
 
 def path_weights(keys: FloatArray, times: FloatArray) -> FloatArray:
-    """Weights (m, 2 p) of the values and rates of p keys, in turn, in the path at m times in s."""
-    size = 2 * len(keys)
-    return path_values(keys, np.eye(size).reshape(-1, 2, size), times)
+    """Weights (m, 3 p) of the states of p keys, in turn, in the path at m times in s."""
+    size = 3 * len(keys)
+    return path_values(keys, np.eye(size).reshape(-1, 3, size), times)

@@ -23,6 +23,8 @@ TRACKS = (
     *("pushes", "pins", "throws"),
 )
 """The lists of events."""
+RATES = ("velocity", "acceleration")
+"""What a pose may say of its motion, beside `ease`."""
 TOP_LEVEL = ("character", "duration", "run", "set", KEYS, *TRACKS)
 
 _LINE_WIDTH = 110  # characters
@@ -48,7 +50,8 @@ def parse(place: Path, text: str) -> dict[str, Any]:
         for pose_number, pose in enumerate(layer["poses"], 1):
             _check_time(f"{where} {pose_number}", pose)
             _check_mapping(f"{where} {pose_number}: pose", pose.get("pose"))
-            _check_mapping(f"{where} {pose_number}: velocity", pose.get("velocity") or {})
+            for name in RATES:
+                _check_mapping(f"{where} {pose_number}: {name}", pose.get(name) or {})
     for track in TRACKS:
         for number, event in enumerate(content.get(track, []), 1):
             _check_time(f"{place}: {track} {number}", event)

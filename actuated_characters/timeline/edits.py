@@ -7,7 +7,7 @@ layer and events of a track are kept in the order of their times.
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from actuated_characters.timeline.content import KEYS, TRACKS, Content, is_number
+from actuated_characters.timeline.content import KEYS, RATES, TRACKS, Content, is_number
 from msgs_config.errors import MotionError, one_of
 
 Edit: TypeAlias = Callable[[Content], Content]
@@ -58,11 +58,12 @@ def add_pose(
     pose: Mapping[str, float],
     ease: str | None = None,
     velocity: Mapping[str, float] | None = None,
+    acceleration: Mapping[str, float] | None = None,
 ) -> Edit:
     """Add a pose (degrees of freedom by name, rad or m) to a layer at a time in s.
 
-    One that is there at this time is replaced, but for its ease and its velocity (rad/s or m/s),
-    where none is given. Layer 0 is made where there is none.
+    One that is there at this time is replaced, but for its ease, its velocity (rad/s or m/s) and
+    its acceleration (rad/s² or m/s²), where none is given. Layer 0 is made where there is none.
     """
 
     def edit(content: Content) -> Content:
@@ -71,7 +72,7 @@ def add_pose(
         poses = list(_item(content, KEYS, layer)["poses"])
         time, found = _time(at), _row_at(poses, at)
         before = {"at": time} if found is None else poses.pop(found)
-        added = _with_velocity({**before, "pose": _all_rounded(pose)}, velocity)
+        added = _with_rates({**before, "pose": _all_rounded(pose)}, velocity, acceleration)
         added = added if ease is None else _eased(added, ease)
         return _with_poses(content, layer, [*poses, added])
 
@@ -118,12 +119,13 @@ def set_pose(
     number: int,
     pose: Mapping[str, float],
     velocity: Mapping[str, float] | None = None,
+    acceleration: Mapping[str, float] | None = None,
 ) -> Edit:
-    """Replace what a pose says (rad or m), such as by its mirror image; None keeps its velocity."""
+    """Replace what a pose says (rad or m), such as by its mirror image; None keeps a rate."""
 
     def edit(content: Content) -> Content:
         replaced = {**_pose(content, layer, number), "pose": _all_rounded(pose)}
-        changed = _with_velocity(replaced, velocity)
+        changed = _with_rates(replaced, velocity, acceleration)
         return _with_poses(content, layer, _with(content[KEYS][layer]["poses"], number, changed))
 
     return edit
@@ -140,7 +142,7 @@ def set_pose_value(layer: int, number: int, name: str, value: float) -> Edit:
 
 
 def set_ease(layer: int, number: int, ease: str) -> Edit:
-    """Set how a pose is moved through: `smooth` or `rest`, which has no velocity."""
+    """Set how a pose is moved through: `smooth` or `rest`, which has no rates."""
 
     def edit(content: Content) -> Content:
         changed = _eased(_pose(content, layer, number), ease)
@@ -252,21 +254,21 @@ def _all_rounded(values: Mapping[str, float]) -> dict[str, float]:
     return {name: rounded(value) for name, value in values.items()}
 
 
-def _with_velocity(
-    pose: Mapping[str, Any], velocity: Mapping[str, float] | None
-) -> Mapping[str, Any]:
-    """A pose with another velocity, without one if that is empty; None is the one it has."""
-    if velocity is None:
-        return pose
-    if not velocity:
-        return _with_value(pose, "velocity", None)
-    pose = _with_value(pose, "ease", None) if pose.get("ease") == "rest" else pose
-    return {**pose, "velocity": _all_rounded(velocity)}
+def _with_rates(pose: Mapping[str, Any], *rates: Mapping[str, float] | None) -> Mapping[str, Any]:
+    """A pose with other `RATES`, without one that is empty; None is the one that it has."""
+    for name, values in zip(RATES, rates, strict=True):
+        if values is None:
+            continue
+        pose = _with_value(pose, name, _all_rounded(values) or None)
+        if values and pose.get("ease") == "rest":
+            pose = _with_value(pose, "ease", None)
+    return pose
 
 
 def _eased(pose: Mapping[str, Any], ease: str) -> dict[str, Any]:
-    """A pose that is moved through in another way: one to rest in has no velocity."""
-    return {**(_with_value(pose, "velocity", None) if ease == "rest" else pose), "ease": ease}
+    """A pose that is moved through in another way: one to rest in has no rates."""
+    left_out = RATES if ease == "rest" else ()
+    return {**{name: each for name, each in pose.items() if name not in left_out}, "ease": ease}
 
 
 def _row_at(poses: list[Any], at: float) -> int | None:

@@ -74,8 +74,8 @@ def mirrored_values(
     return values_of(character, image, (counterpart(character, name) for name in named))
 
 
-def mirrored_velocity(character: Character, velocity: Mapping[str, Any]) -> dict[str, float]:
-    """A pose's velocity mirrored, rad/s or m/s by name.
+def mirrored_rate(character: Character, rate: Mapping[str, Any]) -> dict[str, float]:
+    """A pose's velocity or acceleration mirrored, by name.
 
     Names that are none of the character's, and what is no number, are left out.
 
@@ -83,10 +83,10 @@ def mirrored_velocity(character: Character, velocity: Mapping[str, Any]) -> dict
         ClipError: the character is not its own image.
     """
     names = character.layout.dof_names
-    rates = [velocity[name] if is_number(velocity.get(name)) else np.nan for name in names]
+    rates = [rate[name] if is_number(rate.get(name)) else np.nan for name in names]
     (image,) = mirrored_rates(character, np.array([rates]))
     return {
-        name: float(rate)
-        for name, rate in zip(names, image.tolist(), strict=True)
-        if not np.isnan(rate)
+        name: float(value)
+        for name, value in zip(names, image.tolist(), strict=True)
+        if not np.isnan(value)
     }

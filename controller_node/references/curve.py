@@ -163,6 +163,7 @@ def smooth_knots(
     times: FloatArray,
     configurations: GeneralizedPosition,
     velocities: FloatArray | None = None,
+    own_accelerations: FloatArray | None = None,
     *,
     loops: bool,
 ) -> Knots:
@@ -171,24 +172,27 @@ def smooth_knots(
     At a configuration it moves as the parabola through this one and its two neighbours does, at the
     two ends of what is no loop it is at rest. Where there is a velocity (p, n), and not NaN, it
     moves as the cubic with this velocity through the three does, which is the parabola if the
-    velocity is that of the parabola. The last configuration of a loop is its first one.
+    velocity is that of the parabola. Where there is an acceleration (p, n), and not NaN, it has
+    this one. The last configuration of a loop is its first one.
     """
     durations = np.diff(times)[:, np.newaxis]
     slopes = segment_offsets(layout, configurations) / durations
-    around = around_knots(slopes, durations, loops=loops)
-    automatic, accelerations = _parabolas(*around)
+    around = _around_knots(slopes, durations, loops=loops)
+    rates, accelerations = _parabolas(*around)
     if not loops:
-        for rates in (automatic, accelerations):
-            rates[[0, -1]] = 0.0
-    if velocities is None:
-        return Knots(times, configurations, automatic, accelerations)
-    is_own = ~np.isnan(velocities)
-    rates = np.where(is_own, velocities, automatic)
-    accelerations = np.where(is_own, cubic_accelerations(*around, rates), accelerations)
+        for each in (rates, accelerations):
+            each[[0, -1]] = 0.0
+    if velocities is not None:
+        is_own = ~np.isnan(velocities)
+        rates = np.where(is_own, velocities, rates)
+        accelerations = np.where(is_own, _cubic_accelerations(*around, rates), accelerations)
+    if own_accelerations is not None:
+        is_own = ~np.isnan(own_accelerations)
+        accelerations = np.where(is_own, own_accelerations, accelerations)
     return Knots(times, configurations, rates, accelerations)
 
 
-def around_knots(
+def _around_knots(
     slopes: FloatArray, durations: FloatArray, *, loops: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Slopes before and after each knot (p, n), of those (p - 1, n) between, and durations (p, 1).
@@ -222,7 +226,7 @@ def _parabolas(
     return velocities, accelerations
 
 
-def cubic_accelerations(
+def _cubic_accelerations(
     before: FloatArray,
     after: FloatArray,
     time_before: FloatArray,

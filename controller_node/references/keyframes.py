@@ -27,7 +27,7 @@ class KeyframesReference:
 
     A loop goes on from the last keyframe to the first one of the next period, and is periodic from
     time 0 on. Else the first keyframe is held until its time comes, and the last one from then on;
-    one with a velocity comes from rest, or to rest, within `curve.REST_TIME`.
+    one that moves comes from rest, or to rest, within `curve.REST_TIME`.
     """
 
     def __init__(self, layout: JointLayout, keyframes: Keyframes) -> None:
@@ -50,16 +50,18 @@ def curve_through(layout: JointLayout, keyframes: Keyframes) -> Curve:
     A smooth path is continuous to the acceleration; `smooth_knots` says how it moves.
     """
     times, configurations = keyframes.times, keyframes.configurations
-    velocities, loops = keyframes.velocities, keyframes.period is not None
+    own = keyframes.velocities, keyframes.accelerations
+    loops, is_still = keyframes.period is not None, all(each is None for each in own)
     if keyframes.period is not None:
         times = np.append(times - times[0], keyframes.period)
         configurations = GeneralizedPosition(
             closed(configurations.position), closed(configurations.orientations_xyzw)
         )
-        velocities = None if velocities is None else closed(velocities)
-    if not keyframes.smooth or (len(times) == 1 and velocities is None):
+        velocities, accelerations = (None if each is None else closed(each) for each in own)
+        own = velocities, accelerations
+    if not keyframes.smooth or (len(times) == 1 and is_still):
         return Curve(layout, Knots(times, configurations))
-    knots = smooth_knots(layout, times, configurations, velocities, loops=loops)
+    knots = smooth_knots(layout, times, configurations, *own, loops=loops)
     return Curve(layout, knots if loops else from_and_to_rest(knots))
 
 

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.timeline import edits
-from actuated_characters.timeline.content import KEYS, TRACKS, is_number
+from actuated_characters.timeline.content import KEYS, RATES, TRACKS, is_number
 from actuated_characters.timeline.document import Document
 from actuated_characters.timeline.edits import SHORTEST_TIME, Edit
 from actuated_characters.timeline.poses import (
     joints_of,
     mirrored,
+    mirrored_rate,
     mirrored_values,
-    mirrored_velocity,
     values_of,
     whole_poses,
 )
@@ -51,7 +51,7 @@ class Session:
         """Another one after each pose by hand."""
         self.seen: Callable[[float], FloatArray | None] = lambda time: None
         """What is seen in the place of keys at a time in s, such as a take; (n,) message form."""
-        self._copied: tuple[dict[str, float], dict[str, float]] | None = None
+        self._copied: tuple[dict[str, float], list[dict[str, float]]] | None = None
         self._longest = _LENGTHS  # s that the time line was long
         self._posed: tuple[float, GeneralizedPosition] | None = None  # and the time of that
         self.preview = Preview(character, document.file)
@@ -210,25 +210,30 @@ class Session:
             self.take_pose(mirrored(self.character, self.pose))
             return
         values = mirrored_values(self.character, self.poses, number)
-        velocity = mirrored_velocity(self.character, self.poses[number].get("velocity") or {})
-        self.edit(edits.set_pose(self.layer, number, values, velocity))
+        rates = (mirrored_rate(self.character, each) for each in self._rates(number))
+        self.edit(edits.set_pose(self.layer, number, values, *rates))
+
+    def _rates(self, number: int) -> list[dict[str, float]]:
+        """The velocity and the acceleration of a key of the present layer, empty if none."""
+        return [self.poses[number].get(name) or {} for name in RATES]
 
     def copy(self) -> None:
         """Remember the key at the present time, or the pose that is seen, for `paste`."""
         number, joints = self.key, self.character.layout.joint_names
-        pose, velocity = self.pose, dict[str, float]()
+        pose, rates = self.pose, [dict[str, float]() for _ in RATES]
         if number is not None and not self.is_posed:
-            velocity = self.poses[number].get("velocity") or {}
+            rates = self._rates(number)
             joints = joints_of(self.character, self.poses[number]["pose"])
             pose = whole_poses(self.character, self.poses)[number]
-        self._copied = values_of(self.character, pose, joints), velocity
+        self._copied = values_of(self.character, pose, joints), rates
 
     def paste(self) -> None:
         """Have what was copied as a key at the present time. Raises MotionError if nothing was."""
         if self._copied is None:
             raise MotionError("nothing was copied; copy a key first")
-        values, velocity = self._copied
-        self.edit(edits.add_pose(self.layer, self.time, values, velocity=velocity))
+        values, (velocity, acceleration) = self._copied
+        added = edits.add_pose(self.layer, self.time, values, None, velocity, acceleration)
+        self.edit(added)
 
     def add_layer(self, name: str) -> None:
         """Add a layer above all others, and be in it."""

@@ -3,7 +3,8 @@
 It has the keys `interpolation` (`smooth` or `linear`), `loop`, `period` (s) and `keyframes`, a list
 of a `time` (s) and a `pose` each: degrees of freedom by name, in rad or m. What a pose leaves out
 keeps its value of the keyframe before, at the first one that of the rest pose. With a `velocity`
-(rad/s or m/s, of whole joints) a smooth path has this one there, else that of a parabola.
+(rad/s or m/s, of whole joints) a smooth path has this one there, else that of a parabola; with an
+`acceleration` (rad/s² or m/s²) it has this one, else that of a cubic with the velocity.
 """
 
 import math
@@ -22,7 +23,8 @@ from msgs_config.errors import LayoutError, MotionError, one_of
 from msgs_config.geometry import rotations
 
 _KEYS = ["interpolation", "loop", "period", "keyframes"]
-_KEYFRAME_KEYS = ["time", "pose", "velocity"]
+_RATES = ("velocity", "acceleration")
+_KEYFRAME_KEYS = ["time", "pose", *_RATES]
 _MAX_SHOWN = 200  # characters
 
 
@@ -35,6 +37,7 @@ class Keyframes:
     smooth: bool  # whether the path is a spline, not linear
     period: float | None = None  # s, of a loop
     velocities: FloatArray | None = None  # (p, n), a rotation's in the child frame; NaN: none
+    accelerations: FloatArray | None = None  # (p, n), their rates of change; NaN: none
 
 
 def read_keyframes(character: Character, path: str) -> Keyframes:
@@ -61,15 +64,16 @@ def read_keyframes(character: Character, path: str) -> Keyframes:
             raise MotionError(f"{place} is {_shown(item)}; it must be a mapping with 'time'")
         _check_keys(place, item, _KEYFRAME_KEYS)
     times = _times(places, items)
-    velocities = _velocities(character, places, items)
-    if velocities is not None and interpolation != "smooth":
-        raise MotionError(f"{file}: velocity is for 'interpolation: smooth'; remove it")
+    rates = [_rates(character, places, items, name) for name in _RATES]
+    for name, rows in zip(_RATES, rates, strict=True):
+        if rows is not None and interpolation != "smooth":
+            raise MotionError(f"{file}: {name} is for 'interpolation: smooth'; remove it")
     return Keyframes(
         np.array(times),
         _configurations(character, _positions(character, places, items)),
         interpolation == "smooth",
         _period(file, content, times[-1]),
-        velocities,
+        *rates,
     )
 
 
@@ -137,24 +141,22 @@ def _check_whole_rotations(place: str, layout: JointLayout, pose: dict[str, Any]
             )
 
 
-def _velocities(
-    character: Character, places: list[str], items: list[dict[str, Any]]
+def _rates(
+    character: Character, places: list[str], items: list[dict[str, Any]], key: str
 ) -> FloatArray | None:
-    """The velocities (p, n) that the file has, NaN where it has none; None if there is none."""
+    """Velocities, or accelerations, (p, n) of the file, NaN where it has none; None without any."""
     rows = np.full((len(items), character.layout.size), np.nan)
     for place, item, row in zip(places, items, rows, strict=True):
-        velocity = item.get("velocity")
-        velocity = {} if velocity is None else velocity
-        if not isinstance(velocity, dict):
-            raise _wrong(f"{place}: velocity", velocity, "a mapping of degrees of freedom")
-        names = tuple(map(str, velocity))
+        rates = item.get(key)
+        rates = {} if rates is None else rates
+        if not isinstance(rates, dict):
+            raise _wrong(f"{place}: {key}", rates, "a mapping of degrees of freedom")
+        names = tuple(map(str, rates))
         try:
             entries = character.layout.indices(names)
         except LayoutError as error:
-            raise MotionError(f"{place}: velocity: {error}") from error
-        row[entries] = [
-            _number(f"{place}: velocity.{name}", value) for name, value in velocity.items()
-        ]
+            raise MotionError(f"{place}: {key}: {error}") from error
+        row[entries] = [_number(f"{place}: {key}.{name}", value) for name, value in rates.items()]
     if character.layout.has_floating_base:
         moving, still = rows[:, :3], np.array((0.0, 0.0, 0.0, 1.0))
         rows[:, :3] = replace(character.placement, x=0.0, y=0.0, z=0.0).moved(moving, still)[0]

@@ -28,8 +28,9 @@ class Pose(Entry):
     """Degrees of freedom by name, rad or m; those that a layer has before keep their values."""
 
     values: Mapping[str, float]
-    ease: Ease = Ease.SMOOTH  # of joints without a velocity
+    ease: Ease = Ease.SMOOTH  # of joints without a velocity or an acceleration
     velocity: Mapping[str, float] = field(default_factory=dict)  # rad/s or m/s, of whole joints
+    acceleration: Mapping[str, float] = field(default_factory=dict)  # rad/s² or m/s², likewise
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,7 @@ def make_timeline(file: Path, content: dict[str, Any]) -> Timeline:
 
 
 _CLIP_KEYS = ("at", "clip", "from", "to", "blend", "place", "heading")
+_RATES = ("velocity", "acceleration")
 _STEERING_KEYS = ("at", "until", "velocity", "blend")
 _THROW_KEYS = (
     *("at", "mass", "speed", "target", "from", "distance"),
@@ -156,7 +157,7 @@ def _settings(reader: MappingReader) -> dict[str, Mapping[str, object]]:
 
 
 def _layer(reader: MappingReader, place: str) -> Layer:
-    poses = _track(place, reader.content, "poses", _pose, ("at", "pose", "ease", "velocity"))
+    poses = _track(place, reader.content, "poses", _pose, ("at", "pose", "ease", *_RATES))
     if not poses:
         raise MotionError(f"{place}: poses is missing; it must be a list of one pose or more")
     _check_rising(poses, _SHORTEST)
@@ -172,11 +173,14 @@ def _pose(reader: MappingReader, place: str) -> Pose:
         raise MotionError(f"{place}: pose is empty; it must have degrees of freedom, in rad or m")
     values = {name: pose.number(name, None, *_BOUNDS) for name in pose.content}
     ease = Ease(reader.choice("ease", [each.value for each in Ease]))
-    own = reader.part("velocity")
-    velocity = {name: own.number(name, None, *_BOUNDS) for name in own.content}
-    if velocity and ease is Ease.REST:
-        raise MotionError(f"{place}: a pose has a velocity or 'ease: rest', not both; remove one")
-    return Pose(place, _time(reader), values, ease, velocity)
+    rates = []
+    for key in _RATES:
+        own = reader.part(key)
+        rates.append({name: own.number(name, None, *_BOUNDS) for name in own.content})
+        if own.content and ease is Ease.REST:
+            some = f"{'an' if key[0] == 'a' else 'a'} {key}"
+            raise MotionError(f"{place}: a pose has {some} or 'ease: rest', not both; remove one")
+    return Pose(place, _time(reader), values, ease, *rates)
 
 
 def _clip(reader: MappingReader, place: str) -> ClipEntry:

@@ -86,13 +86,13 @@ def layer_of_poses(character: Character, beneath: Reference, layer: Layer) -> La
     driven, rows = _driven(layout, layer), _rows(character, layer)
     times = np.array([pose.at for pose in layer.poses])
     knots = Knots(times, layout.configuration(rows))
-    velocities = _velocities(layout, layer, driven)
-    if len(times) > 1 or velocities is not None:
-        knots = smooth_knots(layout, times, knots.configurations, velocities, loops=False)
+    rates = [_rates(layout, layer, driven, key) for key in ("velocity", "acceleration")]
+    if len(times) > 1 or any(each is not None for each in rates):
+        knots = smooth_knots(layout, times, knots.configurations, *rates, loops=False)
         rests = [pose.ease is Ease.REST for pose in layer.poses]
-        for rates in (knots.velocities, knots.accelerations):
-            assert rates is not None
-            rates[rests] = 0.0
+        for each in (knots.velocities, knots.accelerations):
+            assert each is not None
+            each[rests] = 0.0
         knots = from_and_to_rest(knots)
     path = Curve(layout, knots)
     span = Span(layer.poses[0].at, layer.poses[-1].at, layer.come, layer.go)
@@ -110,18 +110,19 @@ def _driven(layout: JointLayout, layer: Layer) -> IntArray:
     return np.array(sorted(found), dtype=np.intp)
 
 
-def _velocities(layout: JointLayout, layer: Layer, driven: IntArray) -> FloatArray | None:
-    """The velocities (p, n) that the poses have, NaN where they have none; None without any."""
+def _rates(layout: JointLayout, layer: Layer, driven: IntArray, key: str) -> FloatArray | None:
+    """The velocities, or accelerations, (p, n) of the poses, NaN for none; None without any."""
     rows = np.full((len(layer.poses), layout.size), np.nan)
     for pose, row in zip(layer.poses, rows, strict=True):
+        rates = pose.velocity if key == "velocity" else pose.acceleration
         try:
-            entries = layout.indices(tuple(pose.velocity))
+            entries = layout.indices(tuple(rates))
         except LayoutError as error:
-            raise MotionError(f"{pose.place}: velocity: {error}") from error
-        for name, entry in zip(pose.velocity, entries.tolist(), strict=True):
+            raise MotionError(f"{pose.place}: {key}: {error}") from error
+        for name, entry in zip(rates, entries.tolist(), strict=True):
             if entry not in driven:
-                raise MotionError(f"{pose.place}: velocity: no pose of the layer has '{name}'")
-        row[entries] = list(pose.velocity.values())
+                raise MotionError(f"{pose.place}: {key}: no pose of the layer has '{name}'")
+        row[entries] = list(rates.values())
     return rows if not np.isnan(rows).all() else None
 
 

@@ -27,20 +27,22 @@ def test_what_is_written_is_read(tmp_path: Path, period: float | None) -> None:
     velocities = np.full_like(position, np.nan)
     velocities[1, layout.joint("chest").entries] = (0.5, -2.0, 0.0)
     velocities[2, layout.joint("right_knee").entries] = -1.25
-    keyframes = Keyframes(
-        np.array([0.0, 0.125, 1.2]), layout.configuration(position), True, period, velocities
-    )
+    accelerations = np.full_like(position, np.nan)
+    accelerations[1, layout.joint("chest").entries] = (-8.0, 0.0, 12.5)
+    times, whole = np.array([0.0, 0.125, 1.2]), layout.configuration(position)
+    keyframes = Keyframes(times, whole, True, period, velocities, accelerations)
     file = tmp_path / "keys.yaml"
 
     text = keyframes_text(layout, keyframes, "two\nlines")
     file.write_text(text)
 
-    assert text.startswith("# two\n# lines\n") and text.count("chest_x") == 2
+    assert text.startswith("# two\n# lines\n") and text.count("chest_x") == 3
     assert text.count("velocity: {") == 2
     read = read_keyframes(humanoid, str(file))
     assert read.times.tolist() == [0.0, 0.125, 1.2] and read.smooth and read.period == period
     assert read.configurations.position == pytest.approx(position, abs=1e-12)
     np.testing.assert_array_equal(read.velocities, velocities)
+    np.testing.assert_array_equal(read.accelerations, accelerations)
 
 
 def test_as_a_timeline_they_move_as_keyframes_do(tmp_path: Path) -> None:
@@ -51,7 +53,8 @@ def test_as_a_timeline_they_move_as_keyframes_do(tmp_path: Path) -> None:
     assert knots.velocities is not None
     velocities = np.round(knots.velocities, 4)
     velocities[1, layout.joint("chest").entries] = np.nan
-    keyframes = Keyframes(knots.times, rounded, smooth=True, velocities=velocities)
+    accelerations = 5.0 * velocities[::-1]
+    keyframes = Keyframes(knots.times, rounded, True, None, velocities, accelerations)
     file = tmp_path / "keys.yaml"
 
     file.write_text(timeline_text(layout, keyframes, "a clip", "humanoid"))

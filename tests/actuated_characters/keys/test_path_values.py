@@ -16,9 +16,9 @@ TIMES = np.array([0.0, 0.1, 0.35, 0.4, 1.0])
 def test_the_path_is_that_of_a_run(count: int) -> None:
     rng = np.random.default_rng(1)
     layout = JointLayout([("slider", JointType.PRISMATIC), ("hinge", JointType.REVOLUTE)])
-    keys, states = TIMES[:count], rng.normal(size=(count, 2, 2))
+    keys, states = TIMES[:count], rng.normal(size=(count, 3, 2))
     whole = GeneralizedPosition(states[:, 0], np.empty((count, 0, 4)))
-    keyframes = Keyframes(keys, whole, smooth=True, velocities=states[:, 1])
+    keyframes = Keyframes(keys, whole, True, None, states[:, 1], states[:, 2])
     curve = curve_through(layout, keyframes)
     times = np.linspace(0.0, keys[-1], 77)
 
@@ -31,11 +31,12 @@ def test_the_path_is_that_of_a_run(count: int) -> None:
     assert weighted == pytest.approx(path, abs=1e-12)
 
 
-def test_a_cubic_is_kept_between_inner_keys() -> None:
-    cubic = Polynomial([0.3, -1.0, 2.0, -1.5])
-    states = np.stack([cubic(TIMES), cubic.deriv()(TIMES)], axis=1)[..., np.newaxis]
-    times = np.linspace(0.1, 0.4, 31)
+def test_a_quintic_is_kept() -> None:
+    quintic = Polynomial([0.3, -1.0, 2.0, -1.5, 0.7, 0.2])
+    rows = [quintic.deriv(order)(TIMES) if order else quintic(TIMES) for order in range(3)]
+    states = np.stack(rows, axis=1)[..., np.newaxis]
+    times = np.linspace(0.0, 1.0, 31)
 
     path = path_values(TIMES, states, times)
 
-    assert path[:, 0] == pytest.approx(cubic(times), abs=1e-12)
+    assert path[:, 0] == pytest.approx(quintic(times), abs=1e-12)

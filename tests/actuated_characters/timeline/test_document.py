@@ -105,14 +105,15 @@ def assert_in_order(content: timeline.Content) -> None:
 def assert_no_rest_with_a_velocity(content: timeline.Content) -> None:
     for layer in content.get("keys") or []:
         for pose in layer["poses"]:
-            assert "velocity" not in pose or pose.get("ease") != "rest"
+            is_moving = "velocity" in pose or "acceleration" in pose
+            assert not is_moving or pose.get("ease") != "rest"
 
 
 def test_a_velocity_stays_with_its_pose_until_it_is_to_rest_there(tmp_path: Path) -> None:
     document = Document(tmp_path / "a.yaml", "character: humanoid\n")
     elbow = {"right_elbow": 0.4}
     for edit in (
-        edits.add_pose(0, 1.0, elbow, velocity={"right_elbow": -2.0}),
+        edits.add_pose(0, 1.0, elbow, None, {"right_elbow": -2.0}, {"right_elbow": 9.0}),
         edits.copy_pose(0, 0, 2.0),
         edits.move_pose(0, 1, 3.0),
         edits.add_pose(0, 3.0, {"right_elbow": 0.5}),
@@ -123,9 +124,11 @@ def test_a_velocity_stays_with_its_pose_until_it_is_to_rest_there(tmp_path: Path
 
     first, second = document.content["keys"][0]["poses"]
     assert first == {"at": 1.0, "pose": elbow, "ease": "rest"}
-    assert second == {"at": 3.0, "pose": {"right_elbow": 0.6}, "velocity": {"right_elbow": -2.0}}
+    rates = {"velocity": {"right_elbow": -2.0}, "acceleration": {"right_elbow": 9.0}}
+    assert second == {"at": 3.0, "pose": {"right_elbow": 0.6}, **rates}
     assert document.apply(edits.set_pose(0, 1, elbow, velocity={}))
     assert "velocity" not in document.content["keys"][0]["poses"][1]
+    assert "acceleration" in document.content["keys"][0]["poses"][1]
 
 
 def test_a_new_file_is_there_from_the_first_edit_on(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ import pytest
 
 from actuated_characters.timeline.poses import (
     mirrored,
+    mirrored_rate,
     mirrored_values,
-    mirrored_velocity,
     values_of,
     whole_poses,
 )
@@ -47,7 +47,7 @@ def test_mirrored_twice_is_the_same_and_once_the_other_side() -> None:
     }
 
 
-def test_a_mirrored_velocity_is_how_the_mirror_image_moves() -> None:
+def test_a_mirrored_rate_is_how_the_mirror_image_moves() -> None:
     layout, step = HUMANOID.layout, 1e-5  # s
     position, _ = random_state(HUMANOID, np.random.default_rng(1))
     pose = layout.configuration(0.5 * np.clip(position, *HUMANOID.position_bounds()))
@@ -60,8 +60,8 @@ def test_a_mirrored_velocity_is_how_the_mirror_image_moves() -> None:
 
     way = layout.difference(mirrored(HUMANOID, pose), mirrored(HUMANOID, moved)) / step
     named = dict(zip(layout.dof_names, velocity.tolist(), strict=True))
-    image = mirrored_velocity(HUMANOID, {**named, "tail": 1.0})
+    image = mirrored_rate(HUMANOID, {**named, "tail": 1.0})
 
     assert list(image) == list(layout.dof_names)
     assert list(image.values()) == pytest.approx(way, abs=1e-6)
-    assert mirrored_velocity(HUMANOID, {"right_elbow": 0.7}) == {"left_elbow": pytest.approx(0.7)}
+    assert mirrored_rate(HUMANOID, {"right_elbow": 0.7}) == {"left_elbow": pytest.approx(0.7)}

@@ -166,24 +166,30 @@ def test_a_parabola_is_followed_exactly_between_inner_keyframes() -> None:
 
 @both_ends
 @every_moved
-def test_it_has_its_own_velocity_and_stays_continuous(name: str, period: float | None) -> None:
+def test_it_has_its_own_rates_and_stays_continuous(name: str, period: float | None) -> None:
     whole, layout = loaded(name)
-    velocities = random_knots(whole, TIMES).velocities
-    assert velocities is not None
-    given = velocities.copy()
+    knots = random_knots(whole, TIMES)
+    assert knots.velocities is not None
+    given, forced = knots.velocities.copy(), 5.0 * knots.velocities[::-1]
     given[1], given[3, layout.joints[-1].entries] = np.nan, np.nan
-    reference, automatic = (
-        KeyframesReference(layout, replace(random_keyframes(whole, True, period), velocities=each))
-        for each in (given, None)
+    forced[2], forced[0, layout.joints[-1].entries] = np.nan, np.nan
+    keyframes = random_keyframes(whole, True, period)
+    reference, automatic, moving = (
+        KeyframesReference(layout, replace(keyframes, velocities=each, accelerations=other))
+        for each, other in ((given, forced), (None, None), (given, None))
     )
 
     times = TIMES.tolist() if period is None else [*TIMES, *(TIMES + PERIOD)]
     for time in times:
         before, after = reference.sample(time - INSTANT), reference.sample(time + INSTANT)
         assert_same_motion(layout, before, after, atol=1e-4)
-    for row, own in zip([*given, *given], times, strict=False):
+    for row, own_row, own in zip([*given, *given], [*forced, *forced], times, strict=False):
         expected = np.where(np.isnan(row), automatic.sample(own).velocity, row)
         np.testing.assert_allclose(reference.sample(own).velocity, expected, atol=1e-9)
+        expected = np.where(np.isnan(own_row), moving.sample(own).acceleration, own_row)
+        at_rest = period is None and own == times[-1]  # from then on it stands, if it does not move
+        if not at_rest or not np.isnan(own_row).any():
+            np.testing.assert_allclose(reference.sample(own).acceleration, expected, atol=1e-7)
     inside = np.random.default_rng(4).uniform(0.25, 3.0, 30)
     inside = inside[np.abs(inside[:, np.newaxis] - TIMES).min(axis=1) > 1e-3]
     assert_moves_as_it_says(layout, reference.sample, inside.tolist())
@@ -197,7 +203,7 @@ def test_without_a_velocity_of_its_own_not_a_bit_changes(name: str, period: floa
     none = np.full((len(TIMES), layout.size), np.nan)
     one, other = (
         KeyframesReference(layout, each)
-        for each in (keyframes, replace(keyframes, velocities=none))
+        for each in (keyframes, replace(keyframes, velocities=none, accelerations=none))
     )
 
     for time in np.linspace(0.0, 5.0, 101).tolist():
@@ -223,6 +229,26 @@ def test_a_cubic_with_its_velocities_is_followed_exactly_between_inner_keyframes
         np.testing.assert_allclose(state.configuration.position, cubic(time), atol=1e-12)
         np.testing.assert_allclose(state.velocity, cubic.deriv()(time), atol=1e-12)
         np.testing.assert_allclose(state.acceleration, cubic.deriv(2)(time), atol=1e-11)
+
+
+def test_a_quintic_with_its_rates_is_followed_exactly() -> None:
+    layout = PANDA.layout
+    quintic = Polynomial([0.1, 0.3, -0.2, 0.05, 0.04, -0.01])
+
+    def columns(order: int) -> FloatArray:
+        values = quintic.deriv(order)(TIMES) if order else quintic(TIMES)
+        return np.tile(values[:, np.newaxis], (1, layout.size))
+
+    configurations = layout.configuration(columns(0))
+    reference = KeyframesReference(
+        layout, Keyframes(TIMES, configurations, True, None, columns(1), columns(2))
+    )
+
+    for time in np.linspace(TIMES[0], TIMES[-1], 9).tolist():
+        state = reference.sample(time)
+        np.testing.assert_allclose(state.configuration.position, quintic(time), atol=1e-12)
+        np.testing.assert_allclose(state.velocity, quintic.deriv()(time), atol=1e-11)
+        np.testing.assert_allclose(state.acceleration, quintic.deriv(2)(time), atol=1e-10)
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -431,6 +457,14 @@ REFUSED: dict[str, tuple[object, list[str]]] = {
         {"keyframes": [{**GOOD, "velocity": {"panda_joint1": "fast"}}]},
         ["keyframe 1: velocity.panda_joint1 is 'fast'", "number"],
     ),
+    "acceleration value": (
+        {"keyframes": [{**GOOD, "acceleration": {"panda_joint1": "fast"}}]},
+        ["keyframe 1: acceleration.panda_joint1 is 'fast'", "number"],
+    ),
+    "acceleration linear": (
+        {"keyframes": [{**GOOD, "acceleration": {"panda_joint1": 1}}], "interpolation": "linear"},
+        ["acceleration is for 'interpolation: smooth'"],
+    ),
     "velocity linear": (
         {"keyframes": [{**GOOD, "velocity": {"panda_joint1": 1}}], "interpolation": "linear"},
         ["velocity is for 'interpolation: smooth'"],
@@ -493,7 +527,11 @@ POSES = st.one_of(SCALARS, st.dictionaries(st.sampled_from([*JOINTS, "no"]), SCA
 FRAMES = st.one_of(
     SCALARS,
     st.fixed_dictionaries(
-        {}, optional={"time": SCALARS, "pose": POSES, "velocity": POSES, "x": SCALARS}
+        {},
+        optional={
+            **{"time": SCALARS, "pose": POSES, "velocity": POSES, "acceleration": POSES},
+            "x": SCALARS,
+        },
     ),
 )
 FILES = st.fixed_dictionaries(

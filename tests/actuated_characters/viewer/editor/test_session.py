@@ -85,9 +85,10 @@ def test_a_key_is_mirrored_copied_moved_and_deleted_and_all_is_undone(session: S
     assert session.redo() and session.poses[0]["at"] == 1.0
 
 
-def test_a_velocity_is_mirrored_and_copied_with_its_key(session: Session) -> None:
+def test_rates_are_mirrored_and_copied_with_their_key(session: Session) -> None:
     given, image = {"right_elbow": 2.0}, {"left_elbow": 2.0}
-    session.edit(edits.add_pose(0, 1.0, {"right_elbow": 1.2}, velocity=given))
+    pose = {"right_elbow": 1.2}
+    session.edit(edits.add_pose(0, 1.0, pose, velocity=given, acceleration=given))
     session.playback.seek(1.0)
 
     session.mirror()
@@ -95,7 +96,8 @@ def test_a_velocity_is_mirrored_and_copied_with_its_key(session: Session) -> Non
     session.playback.seek(2.0)
     session.paste()
 
-    assert [pose["velocity"] for pose in session.poses] == [image, image]
+    for name in ("velocity", "acceleration"):
+        assert [pose[name] for pose in session.poses] == [image, image]
 
 
 def test_between_keys_a_mirror_image_is_a_pose_by_hand(session: Session) -> None:

@@ -22,7 +22,7 @@ WHOLE: dict[str, Any] = {
             "in": 0.1,
             "out": "never",
             "poses": [
-                {**POSE, "velocity": {"right_elbow": -1.5}},
+                {**POSE, "velocity": {"right_elbow": -1.5}, "acceleration": {"neck_x": 2}},
                 {**POSE, "at": 2, "ease": "rest"},
             ],
         }
@@ -64,6 +64,7 @@ def test_each_key_is_read(tmp_path: Path) -> None:
     assert [pose.at for pose in layer.poses] == [1.0, 2.0]
     assert [pose.ease for pose in layer.poses] == [Ease.SMOOTH, Ease.REST]
     assert [pose.velocity for pose in layer.poses] == [{"right_elbow": -1.5}, {}]
+    assert [pose.acceleration for pose in layer.poses] == [{"neck_x": 2.0}, {}]
     walk, kick = timeline.clips  # by their times
     assert (walk.clip, walk.begin, walk.end, walk.blend) == ("walk", 0.1, None, 0.3)
     assert (walk.position, walk.heading) == (None, None)
@@ -115,6 +116,10 @@ def test_an_empty_timeline_is_one(tmp_path: Path) -> None:
         (
             {"keys": [{"poses": [{**POSE, "ease": "rest", "velocity": {"right_elbow": 1}}]}]},
             "poses 1: a pose has a velocity or 'ease: rest', not both; remove one",
+        ),
+        (
+            {"keys": [{"poses": [{**POSE, "ease": "rest", "acceleration": {"neck_x": 1}}]}]},
+            "poses 1: a pose has an acceleration or 'ease: rest', not both; remove one",
         ),
         ({"keys": [{"out": "ever", "poses": [POSE]}]}, "keys 1: out is 'ever'; it must be"),
         ({"keys": [{"in": -1, "poses": [POSE]}]}, "keys 1: in is -1; it must be"),

@@ -117,15 +117,17 @@ def test_a_pose_to_rest_in_is_come_to_at_rest(tmp_path: Path) -> None:
         assert reference.sample(1.5).configuration.position[ELBOW] == pytest.approx(0.75)
 
 
-def test_a_pose_is_passed_with_its_velocity(tmp_path: Path) -> None:
+def test_a_pose_is_passed_with_its_velocity_and_its_acceleration(tmp_path: Path) -> None:
     poses = [dict(pose) for pose in WAVE["poses"]]  # type: ignore[attr-defined]
     poses[1]["velocity"] = {"right_elbow": -3.0, "neck_x": 0.2, "neck_y": 0.0, "neck_z": 0.4}
+    poses[1]["acceleration"] = {"right_elbow": 20.0}
     poses[2]["velocity"] = {"right_elbow": 1.0}
     reference = made(tmp_path, keys=[{**WAVE, "poses": poses}])
 
     state = reference.sample(1.5)
     assert state.configuration.position[ELBOW] == pytest.approx(1.4)
     assert state.velocity[ELBOW] == pytest.approx(-3.0)
+    assert state.acceleration[ELBOW] == pytest.approx(20.0)
     assert state.velocity[NECK] == pytest.approx((0.2, 0.0, 0.4))
     assert reference.sample(2.0 - 1e-9).velocity[ELBOW] == pytest.approx(1.0, abs=1e-6)
     for time in (0.6, 1.0, 1.5, 2.0, 2.3, 2.5):
@@ -367,6 +369,11 @@ def test_states_are_the_same_however_often_and_in_which_order_they_are_asked_for
             "humanoid",
             {"keys": [{"poses": [{**STILL, "velocity": {"left_elbow": 1}}]}]},
             "keys 1: poses 1: velocity: no pose of the layer has 'left_elbow'",
+        ),
+        (
+            "humanoid",
+            {"keys": [{"poses": [{**STILL, "acceleration": {"left_elbow": 1}}]}]},
+            "keys 1: poses 1: acceleration: no pose of the layer has 'left_elbow'",
         ),
         (
             "humanoid",

@@ -47,7 +47,9 @@ def layers(draw: st.DrawFn) -> dict[str, Any]:
         pose = draw(kinds)
         if ease == "velocity":
             velocity = {name: draw(st.floats(-20.0, 20.0)) for name in pose}
-            poses.append({"at": at, "pose": pose, "velocity": velocity})
+            acceleration = {name: draw(st.floats(-200.0, 200.0)) for name in pose}
+            rates = {"velocity": velocity, "acceleration": acceleration}
+            poses.append({"at": at, "pose": pose, **rates})
         else:
             poses.append({"at": at, "pose": pose, "ease": ease})
         at += draw(LENGTHS)
