@@ -33,8 +33,15 @@ _MOST_SHOWN = 300  # characters of an error that nobody foresaw
 _WAITING = 3  # rows that wait, for each one that is computed
 _PATIENCE = 10.0  # s until a scheduler must have answered
 _CONFIGURATION = {
-    # A sample of each thread's stack every 10 ms is for dashboards, and here there are none.
+    # Samples of stacks every 10 ms and of loops every 20 ms are for dashboards, and here are none.
     "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "2s",
+    "distributed.admin.tick.limit": "1h",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.system-monitor.disk": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+    # Memory that goes back to the system whenever it can comes back in every run: a tenth of it.
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     # Dask opens a port for pages in any case; there is nothing to be had at it.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
