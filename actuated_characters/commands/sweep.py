@@ -170,7 +170,7 @@ def _conclude(job: "Job", journal: "Journal", report: "Report") -> int:
     different = [each for each in verified if each.difference]
     if verified:
         own = sum(each.by == journal.done[each.number].by for each in verified)
-        alone = f"; {own} by the same worker, for there was no other" if own else ""
+        alone = f"; {own} by the same worker, for no other was there" if own else ""
         print(f"{len(verified)} rows were computed twice, {len(different)} differ{alone}")
     for each in different:
         print(f"error: row {each.number} differs: {each.difference}", file=sys.stderr)

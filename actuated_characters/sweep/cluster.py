@@ -8,6 +8,7 @@ import socket
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from typing import TypeAlias
@@ -30,6 +31,7 @@ from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunE
 from msgs_config.runtime.worker_processes import interrupts_blocked
 
 _MOST_SHOWN = 300  # characters of an error that nobody foresaw
+_MOST_TRIES = 5  # of a row that another worker is to do
 _WAITING = 3  # rows that wait, for each one that is computed
 _PATIENCE = 10.0  # s until a scheduler must have answered
 _CONFIGURATION = {
@@ -50,6 +52,16 @@ _Result: TypeAlias = tuple[Outcome, str, str]  # the worker is named, and has it
 _one_at_a_time = Lock()  # a process with several threads has one engine at work all the same
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked of workers."""
+
+    task: RowTask
+    is_repeat: bool = False
+    not_by: str = ""  # the address of a worker, if another one is to do it
+    tries: int = 1
+
+
 class DaskWorkers:
     """The workers of a cluster, as those of a sweep."""
 
@@ -57,7 +69,7 @@ class DaskWorkers:
         self._client, self._ask = client, ask
         self._versions = engine_versions()
         self._session, self._numbers = uuid.uuid4().hex, itertools.count()
-        self._asked: dict[str, tuple[RowTask, bool]] = {}
+        self._asked: dict[str, _Asked] = {}
         self._answers = as_completed(raise_errors=False)
 
     def size(self) -> int:
@@ -66,45 +78,48 @@ class DaskWorkers:
 
     def submit(self, task: RowTask) -> None:
         """Have a row computed."""
-        self._submit(task, is_repeat=False)
+        self._submit(_Asked(task))
 
     def repeat(self, task: RowTask, address: str) -> None:
         """Have a row computed once more, by another worker if there is another."""
-        others = [each for each in self._threads() if each != address] if address else []
-        self._submit(task, is_repeat=True, workers=others or None)
+        self._submit(_Asked(task, is_repeat=True, not_by=address))
 
-    def _submit(self, task: RowTask, *, is_repeat: bool, workers: list[str] | None = None) -> None:
+    def _submit(self, asked: _Asked) -> None:
         # Keys of their own: Dask takes tasks with the same key for the same task.
-        key = f"row-{task.number}-{self._session}-{next(self._numbers)}"
-        self._asked[key] = task, is_repeat
+        key = f"row-{asked.task.number}-{self._session}-{next(self._numbers)}"
+        self._asked[key] = asked
+        others = self._others(asked.not_by) if asked.not_by else []
         future = self._client.submit(
             _work,
-            task,
+            asked.task,
             self._ask,
             self._versions,
             key=key,
             pure=False,
-            workers=workers,
-            allow_other_workers=workers is not None,  # those that were there may be gone by then
+            workers=others or None,
+            allow_other_workers=bool(others),  # those that were there may be gone by then
         )
         self._answers.add(future)
 
     def wait(self) -> Answer:
         """The next answer; see `Workers`."""
-        future: Future[_Result] = next(self._answers)
-        task, is_repeat = self._asked.pop(str(future.key))
-        if future.status not in ("finished", "error"):
-            raise _lost()
-        error = future.exception()
-        if error is None:
+        while True:
+            future: Future[_Result] = next(self._answers)
+            asked = self._asked.pop(str(future.key))
+            if future.status not in ("finished", "error"):
+                raise _lost()
+            error = future.exception()
+            if error is not None:
+                return Answer(asked.task, asked.is_repeat, None, failure=_failure(asked, error))
             outcome, by, address = future.result()
-            return Answer(task, is_repeat, outcome, by, address)
-        line = " ".join(f"{type(error).__name__}: {error}".split())
-        if isinstance(error, (ActuatedCharactersError, OSError, ImportError)):
-            raise RunError(f"row {task.number}: {error}")
-        if isinstance(error, KilledWorker):
-            line = "each worker that was at it died"
-        return Answer(task, is_repeat, None, failure=line[:_MOST_SHOWN])
+            # Dask lets a worker that is idle take what is meant for others.
+            if address == asked.not_by and asked.tries < _MOST_TRIES and self._others(address):
+                self._submit(replace(asked, tries=asked.tries + 1))
+                continue
+            return Answer(asked.task, asked.is_repeat, outcome, by, address)
+
+    def _others(self, address: str) -> list[str]:
+        return [each for each in self._threads() if each != address]
 
     def _threads(self) -> Mapping[str, int]:
         """The number of threads of each worker, by address."""
@@ -194,6 +209,15 @@ def _quiet() -> Iterator[None]:
     finally:
         for logger, level in levels.items():
             logger.setLevel(level)
+
+
+def _failure(asked: _Asked, error: BaseException) -> str:
+    """Why a row could not be done; raises RunError if it is no matter of that row."""
+    if isinstance(error, (ActuatedCharactersError, OSError, ImportError)):
+        raise RunError(f"row {asked.task.number}: {error}")
+    if isinstance(error, KilledWorker):
+        return "each worker that was at it died"
+    return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_SHOWN]
 
 
 def _lost() -> RunError:

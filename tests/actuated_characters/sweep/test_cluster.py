@@ -99,7 +99,7 @@ def test_one_worker_that_is_verified_by_itself(
 
     assert (code, table(tmp_path)) == (0, alone), printed
     assert "0 differ" in printed
-    assert "by the same worker, for there was no other" in printed
+    assert "by the same worker, for no other was there" in printed
 
 
 def test_two_workers_of_which_one_is_killed(sweep_file: Path, alone: str, tmp_path: Path) -> None:
