@@ -5,6 +5,7 @@ It reads the command's arguments, a list in JSON, as the first line of its stand
 
 import json
 import os
+import select
 import sys
 from contextlib import suppress
 
@@ -26,7 +27,8 @@ def _prepare() -> None:
 
 
 if __name__ == "__main__":
-    _prepare()
+    if not select.select([sys.stdin], [], [], 0.0)[0]:  # else it is asked for already
+        _prepare()
     line = sys.stdin.readline()
     code = main(json.loads(line)) if line else 0
     sys.stdout.flush()

@@ -195,25 +195,6 @@ def replace_event(track: str, number: int, event: Mapping[str, Any]) -> Edit:
     return edit
 
 
-def move_event(track: str, number: int, at: float) -> Edit:
-    """Move an event to another time in s; its end moves along."""
-
-    def edit(content: Content) -> Content:
-        moved = event_at(_item(content, track, number), at)
-        return replace_event(track, number, moved)(content)
-
-    return edit
-
-
-def copy_event(track: str, number: int, at: float) -> Edit:
-    """Add an event once more, at another time in s."""
-
-    def edit(content: Content) -> Content:
-        return add_event(track, event_at(_item(content, track, number), at))(content)
-
-    return edit
-
-
 def delete_event(track: str, number: int) -> Edit:
     """Remove an event."""
 

@@ -11,6 +11,7 @@ from actuated_characters.bags.whole import read_whole
 from actuated_characters.timeline import edits
 from actuated_characters.timeline.document import Document
 from actuated_characters.timeline.takes import takes_of
+from actuated_characters.viewer.editor.items import Item
 from actuated_characters.viewer.editor.page import EditorPage
 from actuated_characters.viewer.editor.session import Session
 from actuated_characters.viewer.editor.shown_takes import NO_TAKE
@@ -98,11 +99,11 @@ def test_what_is_edited_is_seen_and_the_next_take_goes_on_from_the_one_before(
 
     page.takes.choose("1")
     page.step(0.0)
-    session.edit(edits.move_event("pushes", 0, 0.4))
+    page._panel.chosen.move(Item("pushes", 0), 0.4)
     page.step(0.0)
     click(page, "Simulate")
     page.step(0.0)
-    session.edit(edits.move_event("pushes", 0, 0.3))
+    page._panel.chosen.move(Item("pushes", 0), 0.3)
     finish(page)
 
     assert [take.parent for take in takes_of(str(session.document.file)).all()] == ["", "1", "1"]
