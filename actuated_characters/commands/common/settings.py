@@ -97,7 +97,10 @@ def add_repeated(command: argparse._ActionsContainer, name: str, metavar: str, a
 
 def add_inputs(command: argparse._ActionsContainer, push: str, example: str = "") -> None:
     """Add `--push`, with what is to be said of it, and `--set`."""
-    about = f"a force in N, world axes, on a link at a time in s, {push}"
+    about = (
+        "a force in N, world axes, on a link at a time in s, or an impulse in N s from a side, "
+        f"'impulse=NS from=SIDE at=S target=LINK', {push}"
+    )
     add_repeated(command, "--push", _PUSH, about)
     about = f"a parameter of sim_node or controller_node{example}"
     add_repeated(command, "--set", "NODE.NAME:=VALUE", about)

@@ -6,18 +6,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from actuated_characters.runs.planned.keyed_texts import read_keys, read_number, read_side
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.throw import ProjectileThrow, natural_edge, natural_radius
-
-ABOVE = "above"
-SIDES: Mapping[str, float | None] = {
-    "front": 0.0,
-    "left": 90.0,
-    "back": 180.0,
-    "right": -90.0,
-    ABOVE: None,
-}
-"""Angles in degrees about the vertical, counterclockwise from the way that the character faces."""
 
 _REQUIRED_KEYS = ("mass", "speed", "at", "target")
 _OPTIONAL_KEYS = ("from", "distance", "radius", "shape", "size", "slide")
@@ -36,7 +27,7 @@ class ThrowRequest:
     speed: float  # m/s, along the straight way to the target
     at: float  # s since the first state: when it hits
     target: str  # a link
-    side: str = "front"  # one of `SIDES`, or an angle as they have it, degrees
+    side: str = "front"  # as `read_side` has it
     distance: float = 2.0  # m, from the link's centre of mass to where the ball is let go
     radius: float | None = None  # m, of a ball; None: of a density that balls have
     shape: str = BALL  # one of `SHAPES`
@@ -77,27 +68,11 @@ def parse_throw(text: str) -> ThrowRequest:
     Raises:
         ConfigurationError: a key is unknown, repeated or missing, or a value cannot be used.
     """
-    given: dict[str, str] = {}
-    for part in text.replace(",", " ").split():
-        key, equals, value = part.partition("=")
-        if not (equals and value):
-            raise ConfigurationError(f"'{part}': write it as '{_EXAMPLE}'")
-        if key not in KEYS:
-            raise ConfigurationError(one_of("key", key, list(KEYS)))
-        if key in given:
-            raise ConfigurationError(f"'{key}' twice")
-        given[key] = value
-    missing = [key for key in _REQUIRED_KEYS if key not in given]
-    if missing:
-        raise ConfigurationError(f"'{missing[0]}' is missing; write it as '{_EXAMPLE}'")
-    values = {key: _READERS.get(key, partial(_number, key))(value) for key, value in given.items()}
+    given = read_keys(text, _REQUIRED_KEYS, _OPTIONAL_KEYS, _EXAMPLE)
+    values = {
+        key: _READERS.get(key, partial(read_number, key))(value) for key, value in given.items()
+    }
     return ThrowRequest(side=values.pop("from", ThrowRequest.side), **values)
-
-
-def _side(text: str) -> str:
-    if text not in SIDES:
-        _number("from", text, f"an angle in degrees, or one of {', '.join(SIDES)}")
-    return text
 
 
 def _shape(text: str) -> str:
@@ -110,7 +85,7 @@ def _size(text: str) -> tuple[float, ...]:
     edges, what = text.split("x"), "three lengths in m, such as 0.3x0.5x0.2"
     if len(edges) != len(("length", "width", "height")):
         raise ConfigurationError(f"size is '{text}'; it must be {what}")
-    return tuple(_number("size", edge, what) for edge in edges)
+    return tuple(read_number("size", edge, what) for edge in edges)
 
 
 def _slide(text: str) -> bool:
@@ -119,19 +94,9 @@ def _slide(text: str) -> bool:
     return _SWITCH[text]
 
 
-def _number(key: str, value: str, what: str = "a number") -> float:
-    try:
-        found = float(value)
-    except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
-        raise ConfigurationError(f"{key} is '{value}'; it must be {what}")
-    return found
-
-
 _READERS: Mapping[str, Callable[[str], Any]] = {
     "target": str,
-    "from": _side,
+    "from": read_side,
     "shape": _shape,
     "size": _size,
     "slide": _slide,

@@ -10,12 +10,11 @@ import numpy as np
 
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.files import Planned, read_planned
-from actuated_characters.runs.planned.throw_requests import ABOVE, SIDES, ThrowRequest, parse_throw
-from controller_node.references.posture import Posture
+from actuated_characters.runs.planned.keyed_texts import ABOVE, bearing
+from actuated_characters.runs.planned.throw_requests import ThrowRequest, parse_throw
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import Character
 from msgs_config.errors import CommandError, ConfigurationError
-from msgs_config.geometry import fixed_order, rotations
+from msgs_config.geometry import fixed_order
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.throw import ProjectileThrow
 from msgs_config.shared_parameters import PLANE
@@ -47,9 +46,8 @@ def plan_throw(plan: RunPlan, request: ThrowRequest) -> tuple[PlannedThrow, tupl
     if not 0.0 <= request.at < end:
         raise ConfigurationError(f"at is {request.at:g} s; it must be 0 s to less than {end:g} s")
     position = plan.reference.sample(request.at).configuration.position
-    angle, is_above = _bearing(plan.character, position, request.side)
+    angle, origin = bearing(plan.character, position, request.side)
     body = request.body(angle)
-    origin = np.array((0.0, 0.0, 1.0) if is_above else (math.cos(angle), math.sin(angle), 0.0))
     slowing = _slowing(plan, request, body) if request.slide else 0.0
     impact = find_impact(
         plan.character,
@@ -147,19 +145,6 @@ def read_throws(file: Path) -> list[PlannedThrow]:
         return PlannedThrow(fields["stamp_ns"], ProjectileThrow(**fields["throw"]))
 
     return read_planned(file, "throws", make)
-
-
-def _bearing(character: Character, position: FloatArray, side: str) -> tuple[float, bool]:
-    """Angle in rad about z, in the world, of a side of the character; whether it is above."""
-    degrees, heading = SIDES[side] if side in SIDES else float(side), _heading(character, position)
-    return (heading, True) if degrees is None else (math.radians(degrees) + heading, False)
-
-
-def _heading(character: Character, position: FloatArray) -> float:
-    """Angle in rad about z of the way that it faces; 0 of what stands fast."""
-    if not character.layout.has_floating_base:
-        return 0.0
-    return float(Posture(character).heading(rotations.exp(position[3:6])))
 
 
 def _triple(vector: FloatArray) -> tuple[float, float, float]:

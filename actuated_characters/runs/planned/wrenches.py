@@ -8,11 +8,19 @@ from pathlib import Path
 
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.files import Planned, read_planned
+from actuated_characters.runs.planned.keyed_texts import (
+    bearing,
+    read_keys,
+    read_number,
+    read_side,
+)
 from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.messages.clock import TickClock
 from msgs_config.messages.wrenches import WrenchArrays
 from sim_node.node_settings import NodeSettings
 from sim_node.physics.wrenches import WrenchQueue
+
+_EXAMPLE = "impulse=20 from=left at=1.5 target=chest"
 
 
 @dataclass(frozen=True)
@@ -50,12 +58,16 @@ def push_schedule(plan: RunPlan, pushes: Sequence[PlannedPush]) -> WrenchQueue:
 
 
 def parse_push(text: str, plan: RunPlan) -> PlannedPush:
-    """The push of a text `LINK:FX,FY,FZ@S`: N, world axes, and s since the first state.
+    """The push of a text.
+
+    That is `LINK:FX,FY,FZ@S`, N in world axes and s since the first state, or
+    `impulse=NS from=SIDE at=S target=LINK`: a horizontal impulse in N s, or one from above, from a
+    side of the character as it faces in the reference at that time.
 
     Raises:
-        ConfigurationError: the text is not of that form, or see `plan_push`.
+        ConfigurationError: the text is of neither form, or see `plan_push`.
     """
-    return plan_push(plan, *_split(text))
+    return plan_push(plan, *_split(text, plan))
 
 
 def parse_pushes_within(texts: Sequence[str], plan: RunPlan) -> list[PlannedPush]:
@@ -67,13 +79,15 @@ def parse_pushes_within(texts: Sequence[str], plan: RunPlan) -> list[PlannedPush
     rate = plan.simulation.rate_hz
     return [
         plan_push(plan, link, force, time)
-        for link, force, time in map(_split, texts)
+        for link, force, time in (_split(text, plan) for text in texts)
         if not (math.isfinite(time) and round(time * rate) >= plan.ticks)
     ]
 
 
-def _split(text: str) -> tuple[str, tuple[float, float, float], float]:
+def _split(text: str, plan: RunPlan) -> tuple[str, tuple[float, float, float], float]:
     """Link, force and time of a text. Raises ConfigurationError if it is of another form."""
+    if "=" in text:
+        return _impulse(text, plan)
     found = re.fullmatch(r"(.+):([^,@]+),([^,@]+),([^,@]+)@([^,@]+)", text)
     try:
         if found is None:
@@ -81,9 +95,25 @@ def _split(text: str) -> tuple[str, tuple[float, float, float], float]:
         x, y, z, time = (float(number) for number in found.groups()[1:])
     except ValueError:
         raise ConfigurationError(
-            f"push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5"
+            f"push {text}: write it as LINK:FX,FY,FZ@S, such as chest:100,0,0@1.5, or as "
+            f"'{_EXAMPLE}'"
         ) from None
     return found[1], (x, y, z), time
+
+
+def _impulse(text: str, plan: RunPlan) -> tuple[str, tuple[float, float, float], float]:
+    """Link, mean force and time of an impulse from a side."""
+    try:
+        given = read_keys(text, ("impulse", "at", "target"), ("from",), _EXAMPLE)
+        impulse, time = (read_number(key, given[key]) for key in ("impulse", "at"))
+        side = read_side(given.get("from", "front"))
+    except ConfigurationError as error:
+        raise ConfigurationError(f"push '{text}': {error}") from error
+    position = plan.reference.sample(time).configuration.position
+    _, origin = bearing(plan.character, position, side)
+    seconds = NodeSettings.of(plan.simulator).push_ticks / plan.simulation.rate_hz
+    x, y, z = (-impulse / seconds * origin).tolist()
+    return given["target"], (x, y, z), time
 
 
 def plan_push(
