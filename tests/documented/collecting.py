@@ -16,7 +16,11 @@ from actuated_characters.commands.common.overview import OVERVIEW
 from actuated_characters.scenes.scene import scene_names
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs/coming_from").glob("*.md")),
+]
 MADE = "documented.md"  # the page that lists the commands, made from them
 
 _BLOCK = re.compile(r"^```sh\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -18,7 +18,11 @@ from tests.support import parameter_page, topic_table
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / "README.md", ROOT / "CONTRIBUTING.md"),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs/coming_from").glob("*.md")),
+]
 ROOMS = (
     "msgs_config|sim_node|controller_node|character_motion|actuated_characters|lecture|tests|"
     "benchmarks|examples|config"
