@@ -1,26 +1,28 @@
 """The command `actuated_characters sweep`: a table of runs, and a table of what became of them."""
 
 import argparse
-import os
 import shutil
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
+from actuated_characters.commands.common.row_workers import (
+    add_row_workers,
+    check_row_workers,
+    results_directory,
+    row_workers,
+)
 from actuated_characters.commands.common.settings import Commands, add_command
 from msgs_config.errors import ConfigurationError
 from msgs_config.runtime.extras import hint, require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.sweep.journal import Journal
-    from actuated_characters.sweep.work import Job, Report, Workers
+    from actuated_characters.sweep.work import Job, Report
 
 _FOLDER = Path("sweeps")
-_SCRATCH = ".workers"  # in the results' directory: what workers write meanwhile
 _MOST_CHECKED = 50  # rows that are planned before the first one runs
 
 
@@ -40,16 +42,7 @@ def add_sweep(commands: "Commands[argparse.ArgumentParser]") -> None:
             "sweep examples/pushes.yaml --scheduler tcp://HOST:8786",
         ],
     )
-    command.add_argument("file", type=Path, metavar="FILE.yaml", help="what varies, and how")
-    command.add_argument(
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help=f"where the results go ({_FOLDER}/FILE)",
-    )
-    command.add_argument(
-        "--again", action="store_true", help="forget the results in DIR, and begin again"
-    )
+    add_row_workers(command, _FOLDER)
     command.add_argument(
         "--verify",
         type=float,
@@ -57,15 +50,6 @@ def add_sweep(commands: "Commands[argparse.ArgumentParser]") -> None:
         metavar="SHARE",
         help="of the rows, such as 0.02, that is computed once more by another worker; the exit "
         "code is 1 if a result is not the same (0)",
-    )
-    where = command.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=int, metavar="N", help="processes (as many as there are processors)"
-    )
-    where.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="of any cluster of Dask, which computes the rows: tcp://HOST:PORT",
     )
 
 
@@ -80,18 +64,17 @@ def _sweep(options: argparse.Namespace) -> int:
 
     if not 0.0 <= options.verify <= 1.0:
         raise ConfigurationError(f"--verify is {options.verify:g}; it must be a share from 0 to 1")
-    if options.workers is not None and options.workers < 1:
-        raise ConfigurationError(f"--workers is {options.workers}; it must be 1 or more")
+    check_row_workers(options)
     sweep = read_sweep(options.file, row_options(), FIGURES)
     rows = sweep.rows()
     for warning in check_rows(
         options.file, asked_run, rows_to_check(sweep.axes, rows, _MOST_CHECKED)
     ):
         print(warning)
-    directory = (options.output or _FOLDER / options.file.stem).absolute()
-    job = Job(sweep, rows, directory, options.verify)
+    directory = results_directory(options, _FOLDER)
+    job = Job(rows, directory, sweep.bags, sweep.seed, options.verify)
     check_interruption()  # all modules are imported by now
-    made_of = fingerprint(sweep, rows, engine_versions())
+    made_of = fingerprint(rows, engine_versions(), sweep.bags, sweep.seed)
     with Journal(directory, made_of, again=options.again) as journal:
         if journal.has_forgotten:
             shutil.rmtree(directory / ROWS, ignore_errors=True)
@@ -115,7 +98,7 @@ def _work(options: argparse.Namespace, job: "Job", journal: "Journal") -> "Repor
         return Report()
     rows = len(job.rows)
     with (
-        _workers(options, job.directory) as workers,
+        row_workers(options, job.directory) as workers,
         progress_bar(options.file.stem, rows, "rows") as bar,
     ):
 
@@ -128,28 +111,6 @@ def _work(options: argparse.Namespace, job: "Job", journal: "Journal") -> "Repor
 
         progress()
         return work(job, workers, journal, progress)
-
-
-@contextmanager
-def _workers(options: argparse.Namespace, directory: Path) -> "Iterator[Workers]":
-    """The workers that the options ask for."""
-    from actuated_characters.commands.common.row_runs import asked_run
-    from actuated_characters.sweep.cluster import joined_workers, local_workers
-
-    check_interruption()
-    if options.scheduler is not None:
-        with joined_workers(asked_run, options.scheduler) as joined:
-            yield joined
-        return
-    scratch = directory / _SCRATCH
-    shutil.rmtree(scratch, ignore_errors=True)  # of a sweep that was killed
-    scratch.mkdir()
-    try:
-        count = options.workers or len(os.sched_getaffinity(0))
-        with local_workers(asked_run, count, scratch) as workers:
-            yield workers
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _write_table(job: "Job", journal: "Journal") -> None:

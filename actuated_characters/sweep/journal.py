@@ -10,7 +10,6 @@ from typing import IO, Any
 
 from actuated_characters.bags.directory_lock import DirectoryLock
 from actuated_characters.runs.held_signals import signals_held
-from actuated_characters.sweep.file import Sweep
 from actuated_characters.sweep.grid import Row
 from actuated_characters.sweep.row import Outcome
 from msgs_config.digests import sha256_of
@@ -38,8 +37,8 @@ class Verified:
     by: str
 
 
-def fingerprint(sweep: Sweep, rows: Iterable[Row], versions: Mapping[str, str]) -> dict[str, str]:
-    """What a journal's results depend on: the rows, the files that they name, and versions."""
+def fingerprint(rows: Iterable[Row], versions: Mapping[str, str], *also: object) -> dict[str, str]:
+    """What a journal's results depend on: rows, the files that they name, versions, and more."""
     digest = hashlib.sha256()
     files: set[Path] = set()
     for row in rows:
@@ -47,7 +46,7 @@ def fingerprint(sweep: Sweep, rows: Iterable[Row], versions: Mapping[str, str]) 
         files |= {Path(each) for text in row.arguments if (each := text.rpartition("=")[2])}
     for file in sorted(file for file in files if _is_file(file)):
         digest.update(f"{file} {sha256_of(file)}".encode())
-    digest.update(f"{sweep.bags} {sweep.seed}".encode())
+    digest.update(" ".join(map(str, also)).encode())
     return {"rows": digest.hexdigest(), **versions}
 
 

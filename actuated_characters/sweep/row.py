@@ -69,6 +69,7 @@ class Outcome:
     verdict: str = ""
     state_hash: str = ""
     error: str = ""  # why it was refused, or failed: one line
+    is_refused: bool = False  # whether there is no such run, so that it never began
 
     @property
     def has_failed(self) -> bool:
@@ -121,6 +122,9 @@ def with_one_thread(arguments: Sequence[str]) -> list[str]:
 def _outcome(task: RowTask, ask: Ask, directory: Path) -> Outcome:
     try:
         asked = ask(with_one_thread(task.arguments))
+    except ActuatedCharactersError as error:
+        return Outcome({}, error=" ".join(str(error).split()), is_refused=True)
+    try:
         prepare_directory(directory, overwrite=False)
         run_in_process(
             asked.plan,

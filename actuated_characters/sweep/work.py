@@ -1,12 +1,11 @@
 """The work of a sweep: rows to workers, outcomes to the journal, and a share of them once more."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 from actuated_characters.sweep.draws import is_chosen
-from actuated_characters.sweep.file import Sweep
 from actuated_characters.sweep.grid import Row, cell_text
 from actuated_characters.sweep.journal import Done, Journal, Verified
 from actuated_characters.sweep.row import Ask, Outcome, RowTask
@@ -51,24 +50,27 @@ class Workers(Protocol):
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep, and what is asked of it."""
+    """Rows, and what is asked of them."""
 
-    sweep: Sweep
     rows: Sequence[Row]
     directory: Path  # absolute
+    bags: str = "none"  # which are kept: `none`, `failures` or `all`
+    seed: int = 0  # of which rows are computed twice
     verified: float = 0.0  # share of the rows that are computed twice
+    keeps_repeats: bool = False  # whether bags of the second time are kept likewise
 
-    def task(self, row: Row) -> RowTask:
+    def task(self, row: Row, *, is_repeat: bool = False) -> RowTask:
         """What a worker is told of a row."""
         arguments = tuple(map(_with_whole_path, row.arguments))
-        return RowTask(row.number, arguments, self.sweep.bags, self.directory)
+        bags = "none" if is_repeat and not self.keeps_repeats else self.bags
+        return RowTask(row.number, arguments, bags, self.directory)
 
     def to_verify(self) -> frozenset[int]:
         """Numbers of the rows that are computed twice: at least one, if any share is asked for."""
         if self.verified <= 0.0:
             return frozenset()
         numbers = [row.number for row in self.rows]
-        chosen = {n for n in numbers if is_chosen(self.sweep.seed, n, self.verified)}
+        chosen = {n for n in numbers if is_chosen(self.seed, n, self.verified)}
         return frozenset(chosen or numbers[:1])
 
 
@@ -114,6 +116,7 @@ def work(
         RunError: no more answers will come, or the journal cannot be written.
     """
     report, to_verify = Report(), job.to_verify()
+    by_number = {row.number: row for row in job.rows}
     tasks = _tasks(job, journal, to_verify)
     asked = 0
     is_over = False
@@ -139,7 +142,7 @@ def work(
         else:
             journal.add(Done(number, answer.outcome, answer.by))
             if number in to_verify:
-                workers.repeat(replace(answer.task, bags="none"), answer.address)
+                workers.repeat(job.task(by_number[number], is_repeat=True), answer.address)
                 asked += 1
         progress()
 
@@ -155,7 +158,7 @@ def _tasks(job: Job, journal: Journal, to_verify: frozenset[int]) -> Iterator[tu
         if row.number not in journal.done:
             yield job.task(row), False
         elif row.number in to_verify - journal.verified.keys():
-            yield replace(job.task(row), bags="none"), True
+            yield job.task(row, is_repeat=True), True
 
 
 def _compared(done: Done, outcome: Outcome, by: str) -> Verified:

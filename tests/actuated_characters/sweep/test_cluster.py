@@ -138,9 +138,13 @@ def test_a_command_that_is_ended_in_three_ways_and_goes_on_with_four_workers(
 
 
 @contextmanager
-def dask(*arguments: str, says: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def dask(
+    *arguments: str, says: str, before: str = "pass"
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """A scheduler or a worker, and what it says after some words."""
-    program = [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]]
+    module = f"distributed.cli.dask_{arguments[0]}"
+    start = f"import sys; {before}; from {module} import main; main()"
+    program = [sys.executable, "-c", start, *arguments[1:]]
     with subprocess.Popen(
         [*program, "--no-dashboard"], stderr=subprocess.PIPE, text=True, cwd=PROJECT
     ) as process:
@@ -189,7 +193,8 @@ def test_a_scheduler_with_two_workers_that_is_lost(
         scheduler.kill()
         code, printed = command.finish()
         assert (code, command.rows() < ROWS) == (1, True)
-        assert "error: the scheduler is gone; the same command goes on" in printed
+        assert f"{command.rows()} of {ROWS} rows are in {tmp_path / 'part'}" in printed
+        assert "error: the scheduler of the cluster is gone" in printed
         assert "Traceback" not in printed
 
     code, printed = Command(sweep_file, tmp_path / "part", *options).finish()
@@ -197,3 +202,21 @@ def test_a_scheduler_with_two_workers_that_is_lost(
     assert f"error: --scheduler {address}: no scheduler of Dask answers there" in printed
     code, printed = Command(sweep_file, tmp_path / "part", "--workers", "1").finish()
     assert (code, table(tmp_path / "part")) == (0, alone), printed
+
+
+def test_a_worker_without_the_package_is_named(sweep_file: Path, tmp_path: Path) -> None:
+    local, missing = ("--host", "127.0.0.1"), "sys.modules['actuated_characters'] = None"
+    with (
+        dask("scheduler", *local, "--port", "0", says="Scheduler at:") as (_, address),
+        dask(
+            *("worker", address, *local, "--no-nanny", f"--local-directory={tmp_path}/a"),
+            says="Registered to:",
+            before=missing,
+        ),
+    ):
+        code, printed = Command(sweep_file, tmp_path / "out", "--scheduler", address).finish()
+
+    assert code == 1
+    assert "error: the worker tcp://127.0.0.1:" in printed
+    assert "has no actuated_characters; install it in the Python that runs it" in printed
+    assert "Traceback" not in printed

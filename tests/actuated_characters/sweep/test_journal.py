@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from actuated_characters.sweep.file import Sweep
 from actuated_characters.sweep.grid import Row
 from actuated_characters.sweep.journal import JOURNAL, Done, Journal, Verified, fingerprint
 from actuated_characters.sweep.row import Outcome
@@ -107,11 +106,11 @@ def test_a_directory_that_is_a_file_is_a_line(tmp_path: Path) -> None:
 def test_results_depend_on_rows_bags_and_the_files_that_rows_name(tmp_path: Path) -> None:
     clip = tmp_path / "clip.json"
     clip.write_text("1")
-    sweep, rows = Sweep((), "none", 0), [Row(1, (f"--clip={clip}",), {})]
-    first = fingerprint(sweep, rows, {})
+    rows = [Row(1, (f"--clip={clip}",), {})]
+    first = fingerprint(rows, {}, "none", 0)
 
-    assert fingerprint(sweep, [Row(1, (f"--clip={clip}",), {"column": 1})], {}) == first
-    assert fingerprint(Sweep((), "all", 0), rows, {}) != first
-    assert fingerprint(sweep, [*rows, *rows], {}) != first
+    assert fingerprint([Row(1, (f"--clip={clip}",), {"column": 1})], {}, "none", 0) == first
+    assert fingerprint(rows, {}, "all", 0) != first
+    assert fingerprint([*rows, *rows], {}, "none", 0) != first
     clip.write_text("23")
-    assert fingerprint(sweep, rows, {}) != first
+    assert fingerprint(rows, {}, "none", 0) != first

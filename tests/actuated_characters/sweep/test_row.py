@@ -63,7 +63,7 @@ def test_a_row_has_the_figures_of_the_command_with_its_options(
 def test_a_row_that_is_refused_is_a_line_and_keeps_no_bag(tmp_path: Path) -> None:
     outcome = outcome_of(tmp_path, *PENDULUM, "--push=arm:1,0,0@0", bags="all")
 
-    assert outcome == Outcome({}, error=outcome.error)
+    assert outcome == Outcome({}, error=outcome.error, is_refused=True)
     assert outcome.error.startswith("push: unknown link 'arm'")
     assert not (tmp_path / "rows").exists()
 

@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from actuated_characters.runs.planned.inputs import NO_INPUTS
-from actuated_characters.sweep.file import Sweep
 from actuated_characters.sweep.grid import Row
 from actuated_characters.sweep.journal import Journal
 from actuated_characters.sweep.row import AskedRun, Outcome, RowTask
@@ -19,8 +18,8 @@ OUTCOMES = {number: Outcome({"ticks": number}, "It ran.", f"hash {number}") for 
 
 
 def job(folder: Path, rows: int = 6, verified: float = 0.0) -> Job:
-    sweep = Sweep((), "all", 0)
-    return Job(sweep, [Row(n, (f"--x={n}",), {}) for n in range(1, rows + 1)], folder, verified)
+    made = [Row(n, (f"--x={n}",), {}) for n in range(1, rows + 1)]
+    return Job(made, folder, "all", verified=verified)
 
 
 class Here:
@@ -159,7 +158,7 @@ def test_files_are_given_with_their_whole_paths(
     (tmp_path / "walk").write_text("a file that happens to be there")
     row = Row(1, ("--clip=a.json", "--timeline=b.yaml", "--keyframes=walk"), {})
 
-    task = Job(Sweep((), "none", 0), [row], tmp_path).task(row)
+    task = Job([row], tmp_path).task(row)
 
     assert task.arguments == (f"--clip={tmp_path}/a.json", "--timeline=b.yaml", "--keyframes=walk")
 

@@ -1,53 +1,25 @@
-"""The workers of a sweep: processes of Dask, on this machine or on any cluster."""
+"""The computation of a sweep's rows by the workers of a cluster."""
 
 import itertools
-import logging
 import os
-import signal
 import socket
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 from typing import TypeAlias
 
-import dask
-from distributed import (
-    Client,
-    Future,
-    KilledWorker,
-    LocalCluster,
-    Security,
-    as_completed,
-    get_worker,
-)
+from distributed import Client, Future, KilledWorker, as_completed, get_worker
 
-from actuated_characters.runs.held_signals import signals_held
+from actuated_characters.cluster import WORKERS_DIED, lost
 from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute, engine_versions
 from actuated_characters.sweep.work import Answer
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
-from msgs_config.runtime.worker_processes import interrupts_blocked
 
 _MOST_SHOWN = 300  # characters of an error that nobody foresaw
 _MOST_TRIES = 5  # of a row that another worker is to do
 _WAITING = 3  # rows that wait, for each one that is computed
-_PATIENCE = 10.0  # s until a scheduler must have answered
-_CONFIGURATION = {
-    # Samples of stacks every 10 ms and of loops every 20 ms are for dashboards, and here are none.
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "2s",
-    "distributed.admin.tick.limit": "1h",
-    "distributed.admin.system-monitor.interval": "10s",
-    "distributed.admin.system-monitor.disk": False,
-    "distributed.admin.system-monitor.gil.enabled": False,
-    # Memory that goes back to the system whenever it can comes back in every run: a tenth of it.
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
-    # Dask opens a port for pages in any case; there is nothing to be had at it.
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-}
 _Result: TypeAlias = tuple[Outcome, str, str]  # the worker is named, and has its address
 _one_at_a_time = Lock()  # a process with several threads has one engine at work all the same
 
@@ -107,7 +79,7 @@ class DaskWorkers:
             future: Future[_Result] = next(self._answers)
             asked = self._asked.pop(str(future.key))
             if future.status not in ("finished", "error"):
-                raise _lost()
+                raise lost()
             error = future.exception()
             if error is not None:
                 return Answer(asked.task, asked.is_repeat, None, failure=_failure(asked, error))
@@ -126,89 +98,8 @@ class DaskWorkers:
         try:
             threads: Mapping[str, int] = self._client.nthreads()
         except (OSError, TimeoutError) as error:
-            raise _lost() from error
+            raise lost() from error
         return threads
-
-
-@contextmanager
-def local_workers(ask: Ask, count: int, scratch: Path) -> Iterator[DaskWorkers]:
-    """Workers on this machine, of which nothing is left in the end; they listen to it alone.
-
-    Args:
-        ask: Makes the rows' runs.
-        count: Of the processes, each with one thread.
-        scratch: Takes their files.
-    """
-    with _quiet(), dask.config.set(_CONFIGURATION), ExitStack() as at_end:
-        # what is begun meanwhile, threads and processes, leaves Ctrl-C to this one
-        with signals_held(), interrupts_blocked():
-            cluster = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                security=Security.temporary(),  # else whoever has an account here could send work
-                memory_limit=0,  # what runs take is theirs, not Dask's to be moved to the disk
-                local_directory=str(scratch),
-                silence_logs=logging.CRITICAL,
-            )
-            clients: list[Client] = []
-            at_end.callback(_end, cluster, clients)
-            clients.append(Client(cluster))
-        yield DaskWorkers(clients[0], ask)
-
-
-def _end(cluster: LocalCluster, clients: Sequence[Client]) -> None:
-    """End the processes there and then: nobody waits for what they are at."""
-    with signals_held(most=2):
-        for nanny in cluster.workers.values():
-            nanny.auto_restart = False
-            if (process := nanny.pid) is not None:
-                with suppress(ProcessLookupError):
-                    os.kill(process, signal.SIGKILL)
-        for client in clients:
-            client.close()
-        cluster.close()
-
-
-@contextmanager
-def joined_workers(ask: Ask, address: str) -> Iterator[DaskWorkers]:
-    """The workers of a cluster whose scheduler has that address.
-
-    Raises:
-        ConfigurationError: there is none.
-    """
-    with _quiet(), dask.config.set(_CONFIGURATION), ExitStack() as at_end:
-        try:
-            with signals_held(), interrupts_blocked():
-                client = Client(address, timeout=_PATIENCE)
-                at_end.callback(_leave, client)
-        except (OSError, TimeoutError, ValueError) as error:
-            raise ConfigurationError(
-                f"--scheduler {address}: no scheduler of Dask answers there; write it as "
-                "tcp://HOST:PORT"
-            ) from error
-        yield DaskWorkers(client, ask)
-
-
-def _leave(client: Client) -> None:
-    with signals_held(most=2), suppress(OSError, TimeoutError):
-        client.close()
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Leave it to this package to say what went wrong."""
-    loggers = [logging.getLogger(name) for name in logging.root.manager.loggerDict]
-    levels = {each: each.level for each in loggers if each.name.startswith("distributed")}
-    try:
-        for logger in levels:
-            logger.setLevel(logging.CRITICAL)
-        yield
-    finally:
-        for logger, level in levels.items():
-            logger.setLevel(level)
 
 
 def _failure(asked: _Asked, error: BaseException) -> str:
@@ -216,12 +107,8 @@ def _failure(asked: _Asked, error: BaseException) -> str:
     if isinstance(error, (ActuatedCharactersError, OSError, ImportError)):
         raise RunError(f"row {asked.task.number}: {error}")
     if isinstance(error, KilledWorker):
-        return "each worker that was at it died"
+        return WORKERS_DIED
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_SHOWN]
-
-
-def _lost() -> RunError:
-    return RunError("the scheduler is gone; the same command goes on when there is one again")
 
 
 def _work(task: RowTask, ask: Ask, versions: Mapping[str, str]) -> "_Result":

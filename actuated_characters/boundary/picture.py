@@ -1,0 +1,147 @@
+"""The picture of a search: up to where runs hold, over what varies, or around the character."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+
+from actuated_characters.boundary.survey import Point, Survey
+from actuated_characters.boundary.table import heading
+from actuated_characters.sweep.grid import cell_text
+from msgs_config.whole_files import writing
+
+PICTURE = "boundary.png"
+_MOST_PANELS, _PANELS_IN_ROW = 24, 4
+_PANEL = 3.0  # inches
+_HOLDS, _HOLE, _ALL_HOLD = "tab:green", "tab:blue", "tab:olive"
+_Panels: TypeAlias = Sequence[tuple[str, Sequence[Point]]]
+
+
+def draw(found: Survey, file: Path) -> bool:
+    """Draw the points without an error; returns whether there is anything to draw.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+    points = [point for point in found.points if point.tried and not point.error]
+    columns = [name for name in (points[0].cells if points else ()) if _varies(name, points)]
+    if not columns:
+        return False
+    around = found.search.around
+    along = around if around in columns else columns[-1]
+    panels = _panels(points, [name for name in columns if name != along])[:_MOST_PANELS]
+    width = min(len(panels), _PANELS_IN_ROW)
+    height = math.ceil(len(panels) / width)
+    size = (max(width, 2) * _PANEL, height * _PANEL + 0.5)
+    figure, reach = Figure(figsize=size, layout="constrained"), _reach(found, points)
+    for place, (title, inside) in enumerate(panels, start=1):
+        if along == around:
+            axes: Axes = figure.add_subplot(height, width, place, projection="polar")
+            _draw_around(axes, found, inside, reach)
+        else:
+            axes = figure.add_subplot(height, width, place)
+            _draw_along(axes, found, inside, along)
+            axes.set_ylim(min(found.search.way.first, found.search.way.last), reach)
+        axes.set_title(title, fontsize="medium")
+    figure.suptitle(_title(found), fontsize="medium")
+    labels = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(labels.values(), labels, loc="outside lower center", ncols=3, fontsize="small")
+    with writing(file) as part:
+        figure.savefig(part, dpi=120, format="png")
+    return True
+
+
+def _title(found: Survey) -> str:
+    search = found.search
+    return f"{heading(search.value)} up to which runs hold, found to within {search.way.within:g}"
+
+
+def _varies(name: str, points: Sequence[Point]) -> bool:
+    return len({point.cells[name] for point in points}) > 1
+
+
+def _panels(points: Sequence[Point], columns: Sequence[str]) -> list[tuple[str, list[Point]]]:
+    """The points by all that varies but what is drawn along, each with its title."""
+    panels: dict[str, list[Point]] = {}
+    for point in points:
+        title = ", ".join(f"{heading(name)} {cell_text(point.cells[name])}" for name in columns)
+        panels.setdefault(title, []).append(point)
+    return list(panels.items())
+
+
+def _draw_around(axes: Axes, found: Survey, points: Sequence[Point], reach: float) -> None:
+    """Bars around the character, which faces upwards; the angle is that of where a push is from."""
+    assert isinstance(axes, PolarAxes)
+    way = found.search.way
+    inner = min(way.first, way.last)
+    angles = [math.radians(float(point.cells[found.search.around] or 0)) for point in points]
+    axes.set_theta_zero_location("N")
+    axes.set_ylim(inner, reach)
+    axes.tick_params(labelsize="x-small")
+    for colour, label, are_open in ((_HOLDS, "holds", False), (_ALL_HOLD, "nothing failed", True)):
+        for angle, point in zip(angles, points, strict=True):
+            boundary = found.boundary(point)
+            if boundary.holds is None or (boundary.fails is None) != are_open:
+                continue
+            length, width = boundary.holds - inner, 0.9 * math.tau / len(points)
+            axes.bar(angle, length, width, inner, color=colour, alpha=0.6, label=label)
+    _draw_holes(axes, found, angles, points)
+
+
+def _reach(found: Survey, points: Sequence[Point]) -> float:
+    """Up to which value there is something to be seen."""
+    way, boundaries = found.search.way, [found.boundary(point) for point in points]
+    if way.last < way.first or any(each.fails is None for each in boundaries):
+        return float(max(way.first, way.last))
+    ends = [value for each in boundaries for value in (each.fails, *each.holes)]
+    return 1.1 * max(float(value) for value in ends if value is not None)
+
+
+def _draw_along(axes: Axes, found: Survey, points: Sequence[Point], name: str) -> None:
+    """A line over what varies; what is no number stands in the order of the file."""
+    cells = [point.cells[name] for point in points]
+    are_numbers = all(type(cell) in (int, float) for cell in cells)
+    places = [
+        float(cell) if are_numbers and isinstance(cell, (int, float)) else float(count)
+        for count, cell in enumerate(cells)
+    ]
+    if not are_numbers:
+        axes.set_xticks(places, [cell_text(cell) or "-" for cell in cells], rotation=30, ha="right")
+    boundaries = [found.boundary(point) for point in points]
+    heights = [math.nan if each.holds is None else float(each.holds) for each in boundaries]
+    axes.plot(places, heights, color=_HOLDS, marker=".", label="holds")
+    full = [
+        (place, height)
+        for place, height, each in zip(places, heights, boundaries, strict=True)
+        if each.fails is None
+    ]
+    _mark(axes, full, color=_ALL_HOLD, marker="^", label="nothing failed")
+    _draw_holes(axes, found, places, points)
+    axes.set_xlabel(heading(name))
+    axes.set_ylabel(heading(found.search.value))
+    axes.grid(alpha=0.3)
+
+
+def _draw_holes(
+    axes: Axes, found: Survey, places: Sequence[float], points: Sequence[Point]
+) -> None:
+    holes = [
+        (place, float(value))
+        for place, point in zip(places, points, strict=True)
+        for value in found.boundary(point).holes
+    ]
+    _mark(axes, holes, color=_HOLE, marker="o", markersize=4, label="holds again")
+
+
+def _mark(axes: Axes, places: Sequence[tuple[float, float]], **style: Any) -> None:
+    """Mark places, if there are any."""
+    if places:
+        axes.plot(*zip(*places, strict=True), linestyle="", fillstyle="none", **style)

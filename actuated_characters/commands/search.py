@@ -1,0 +1,153 @@
+"""The command `actuated_characters search`: from which value on runs fail."""
+
+import argparse
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.progress import progress_bar, say
+from actuated_characters.commands.common.row_workers import (
+    add_row_workers,
+    check_row_workers,
+    results_directory,
+    row_workers,
+)
+from actuated_characters.commands.common.settings import Commands, add_command
+from actuated_characters.commands.common.tables import make_table, show
+from msgs_config.runtime.extras import require_extra
+
+if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.boundary.survey import Survey
+    from actuated_characters.sweep.journal import Journal
+    from actuated_characters.sweep.table import Record
+    from actuated_characters.sweep.work import Report
+
+_FOLDER = Path("searches")
+_MOST_CHECKED = 25  # points whose ends are planned before the first run
+_MOST_SHOWN = 30  # points in the table on the screen
+
+
+def add_search(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    command = add_command(
+        commands,
+        _search,
+        "search",
+        "search the least push, or any other value, with which runs fail",
+        "Search from which value on runs fail, at each point of a grid: the least push by side and "
+        "phase that fells a walk, the lowest friction, the longest delay. DIR/boundary.csv has a "
+        "line for each point, DIR/boundary.png is their picture, DIR/rows has a bag of each, and "
+        "DIR/table.csv all runs. Runs that hold beyond the first that fails are told. Ctrl-C keeps "
+        "what is done; the same command goes on. docs/search.md says what the file may have.",
+        ["search examples/longest_delay.yaml", "search examples/push_map_balance.yaml"],
+    )
+    add_row_workers(command, _FOLDER)
+
+
+def _search(options: argparse.Namespace) -> int:
+    require_extra("sweep", "search")
+    from actuated_characters.boundary.file import read_search
+    from actuated_characters.boundary.survey import Survey
+    from actuated_characters.commands.common.row_runs import asked_run, row_options
+    from actuated_characters.sweep.journal import Journal, fingerprint
+    from actuated_characters.sweep.row import FIGURES, ROWS, engine_versions
+    from actuated_characters.sweep.work import check_rows
+
+    check_row_workers(options)
+    search = read_search(options.file, row_options(), FIGURES)
+    found = Survey(search)
+    ends = [
+        search.row(point.number, value, point.number)
+        for point in found.points
+        for value in (search.way.first, search.way.last)
+    ]
+    for warning in check_rows(options.file, asked_run, ends[: 2 * _MOST_CHECKED]):
+        print(warning)
+    directory = results_directory(options, _FOLDER)
+    check_interruption()  # all modules are imported by now
+    made_of = fingerprint(ends, engine_versions(), search.way, search.figure, search.limit)
+    with Journal(directory, made_of, again=options.again) as journal:
+        if journal.has_forgotten:
+            shutil.rmtree(directory / ROWS, ignore_errors=True)
+        try:
+            report = _work(options, found, directory, journal)
+        except BaseException:
+            if journal.done:
+                say(f"{len(journal.done)} runs are in {directory}; the same command goes on")
+            raise
+        return _conclude(found, directory, journal, report)
+
+
+def _work(
+    options: argparse.Namespace, found: "Survey", directory: Path, journal: "Journal"
+) -> "Report":
+    """Have the runs done; shows the progress."""
+    from actuated_characters.boundary.survey import survey
+
+    with (
+        row_workers(options, directory) as workers,
+        progress_bar(options.file.stem, found.most_rows(), "runs") as bar,
+    ):
+
+        def progress() -> None:
+            bar.update(bar.task_ids[0], completed=len(journal.done))
+
+        progress()
+        report = survey(found, directory, workers, journal, progress)
+        bar.update(bar.task_ids[0], total=len(journal.done))  # it may have been fewer
+        return report
+
+
+def _conclude(found: "Survey", directory: Path, journal: "Journal", report: "Report") -> int:
+    """Write tables and picture, and say what was found; returns the exit code."""
+    from actuated_characters.boundary.picture import PICTURE, draw
+    from actuated_characters.boundary.table import BOUNDARY, boundary_records, write_boundary
+    from actuated_characters.sweep.table import make_records, write_tables
+
+    write_tables(directory, make_records(found.rows, journal.done))
+    errors = list(report.undone)
+    if not report.undone:
+        records = boundary_records(found, journal.done)
+        write_boundary(directory, found, journal.done)
+        if len(records) <= _MOST_SHOWN:
+            _print_points(records)
+        _print_summary(found)
+        print(f"the table: {directory / BOUNDARY}; a bag of each point: {directory / 'rows'}")
+        if draw(found, directory / PICTURE):
+            print(f"the picture: {directory / PICTURE}")
+        errors += [f"point {each.number}: {each.error}" for each in found.points if each.error]
+    different = [each for each in journal.verified.values() if each.difference]
+    errors += [f"row {each.number} differs: {each.difference}" for each in different]
+    for line in errors:
+        print(f"error: {line}", file=sys.stderr)
+    return int(bool(errors))
+
+
+def _print_points(records: "Sequence[Record]") -> None:
+    from actuated_characters.boundary.table import heading
+
+    shown = [name for name in records[0] if name not in ("state_hash", "error")]
+    rows = [[show(record[name]) for name in shown] for record in records]
+    Console().print(make_table("", list(map(heading, shown)), rows))
+
+
+def _print_summary(found: "Survey") -> None:
+    """Say how many runs there were, and what is not as one would think."""
+    boundaries = [found.boundary(point) for point in found.points if not point.error]
+    failure = found.search.describe_failure()
+    print(f"{len(found.rows)} runs, {len(boundaries)} points; a run has failed if {failure}")
+    for count, what in (
+        (sum(each.fails is None for each in boundaries), "held all along the way"),
+        (sum(each.holds is None for each in boundaries), "failed from the first value on"),
+        (
+            sum(bool(each.holes) for each in boundaries),
+            "have holes: beyond the first value that fails, others hold again",
+        ),
+    ):
+        if count:
+            print(f"{count} points {what}")
