@@ -44,6 +44,7 @@ class Job:
     output: Path
     workers: int = 1
     resume: bool = False
+    scheduler: str | None = None  # the address of a cluster's, which grows the worlds
 
     @property
     def key(self) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def reconstruct(
         report(progress, windows)
 
     report(progress, windows)
-    with Workers(job.problem, window, job.workers) as workers:
+    with Workers(job.problem, window, job.workers, job.scheduler) as workers:
         stuck_at = search(workers, windows, job.settings, progress, after_window)
     best = result(progress)
     if best is None:

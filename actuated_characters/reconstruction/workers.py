@@ -1,38 +1,60 @@
 """Processes that grow branches, each with its own engine."""
 
+import os
+import tempfile
+import uuid
 from collections.abc import Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
 
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.world import Branch, Grown, Lost, TrialWorld
-from msgs_config.errors import RunError
-from msgs_config.runtime.worker_processes import WorkerProcesses
+from msgs_config.runtime.extras import PACKAGES
 
-_MOST_DEATHS = 5  # deaths of processes in one window, after which something else must be wrong
+if TYPE_CHECKING:  # it takes a second to import, and is needed for several processes alone
+    from distributed import Client
 
-_engine: tuple[Problem, int] | None = None  # what a process makes its world of
-_world: TrialWorld | None = None
+_one_at_a_time = Lock()  # a process with several threads has one engine at work all the same
+_worlds: dict[str, TrialWorld] = {}  # of this process, by the search: one at most
+
+
+def has_dask() -> bool:
+    """Whether there can be more than one process."""
+    return all(map(find_spec, PACKAGES["sweep"]))
+
+
+def usual_count() -> int:
+    """As many processes as there are processors, if there can be; else one."""
+    return len(os.sched_getaffinity(0)) if has_dask() else 1
 
 
 class Workers:
-    """Grows branches on a number of processes; 1 is this process alone.
+    """Grows branches: in this process alone, or on a cluster of Dask.
 
-    To be closed by its opener, which ends all the processes. A process that dies is replaced, and
-    what it was doing is done again.
+    To be closed by its opener, which ends all processes of a cluster on this machine. What a
+    process did that dies is done again.
     """
 
-    def __init__(self, problem: Problem, window_ticks: int, count: int) -> None:
+    def __init__(
+        self, problem: Problem, window_ticks: int, count: int, scheduler: str | None = None
+    ) -> None:
+        """On a number of processes of this machine, or on the cluster of a scheduler's address."""
         self._engine = problem, window_ticks
-        self._count = count
-        self._pool: WorkerProcesses | None = None
+        self._count, self._scheduler = count, scheduler
+        self._session = uuid.uuid4().hex
+        self._open = ExitStack()
+        self._client: Client | None = None
         self._own: TrialWorld | None = None
 
     def __enter__(self) -> "Workers":
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._pool is not None:
-            self._pool.__exit__(*error)
+        self._open.close()
         if self._own is not None:
             self._own.close()
 
@@ -40,37 +62,34 @@ class Workers:
         """What becomes of branches, in their order.
 
         Raises:
-            ActuatedCharactersError: a process cannot make the problem's plan, or all of them die.
+            ActuatedCharactersError: a process cannot make the problem's plan, all of them die, or
+                there is no such scheduler.
         """
-        if self._count == 1:
+        if self._count == 1 and self._scheduler is None:
             self._own = self._own or TrialWorld(*self._engine)
             for branch in branches:
                 yield self._own.grow(branch)
             return
-        done = 0
-        for _ in range(_MOST_DEATHS):
-            self._pool = self._pool or WorkerProcesses(self._count, _begin, *self._engine)
-            try:
-                for grown in self._pool.map(_grow, branches[done:]):
-                    done += 1
-                    yield grown
-            except BrokenProcessPool:
-                self._pool.close()
-                self._pool = None
-                continue
-            return
-        raise RunError(f"{_MOST_DEATHS} times a process of the search has died")
+        from actuated_characters.cluster import results_in_order
+
+        self._client = self._client or self._started()
+        task = partial(_grow, self._session, *self._engine)
+        yield from results_in_order(self._client, task, branches)
+
+    def _started(self) -> "Client":
+        from actuated_characters.cluster import joined_cluster, local_cluster
+
+        if self._scheduler is not None:
+            return self._open.enter_context(joined_cluster(self._scheduler))
+        scratch = self._open.enter_context(tempfile.TemporaryDirectory(prefix="reconstruct-"))
+        return self._open.enter_context(local_cluster(self._count, Path(scratch)))
 
 
-def _begin(problem: Problem, window_ticks: int) -> None:
-    """What a worker's process does first."""
-    global _engine
-    _engine = problem, window_ticks
-
-
-def _grow(branch: Branch) -> Grown | Lost:
-    global _world
-    if _world is None:
-        assert _engine is not None
-        _world = TrialWorld(*_engine)  # an error in this line becomes the task's error
-    return _world.grow(branch)
+def _grow(session: str, problem: Problem, window_ticks: int, branch: Branch) -> Grown | Lost:
+    """Grow a branch in a worker's process."""
+    with _one_at_a_time:
+        if session not in _worlds:
+            while _worlds:  # of a search that is over
+                _worlds.popitem()[1].close()
+            _worlds[session] = TrialWorld(problem, window_ticks)
+        return _worlds[session].grow(branch)

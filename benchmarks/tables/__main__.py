@@ -11,7 +11,6 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -61,7 +60,7 @@ def main() -> int:
     try:
         with TemporaryDirectory() as folder:
             done = _runs(options, Path(folder))
-    except (ActuatedCharactersError, BrokenProcessPool) as error:
+    except ActuatedCharactersError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -95,7 +94,7 @@ def _runs(options: argparse.Namespace, folder: Path) -> list[Result]:
     done: list[Result] = []
     with Progress(console=console) as progress:
         bar = progress.add_task("runs", total=len(cases))
-        for case, facts in results(cases, table.measure, options.processes):
+        for case, facts in results(cases, table.measure, options.processes, folder):
             done.append((case, facts))
             known = {name: fact for name, fact in facts.items() if fact is not None}
             words = ", ".join(f"{name}: {cell([fact])}" for name, fact in known.items())

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
+from actuated_characters.cluster import local_cluster, results_in_order
 from benchmarks.tables.case import Case, Fact
 from benchmarks.tables.seen import Seen, see
-from msgs_config.runtime.process import limit_threads
-from msgs_config.runtime.worker_processes import WorkerProcesses
 
 Measure: TypeAlias = Callable[[Seen], Mapping[str, Fact]]
 Result: TypeAlias = tuple[Case, Mapping[str, Fact]]
@@ -48,17 +48,17 @@ def attempt(case: Case, measure: Measure) -> Mapping[str, Fact]:
     return {**case.facts, **measure(see(case))}
 
 
-def results(cases: Sequence[Case], measure: Measure, processes: int) -> Iterator[Result]:
+def results(
+    cases: Sequence[Case], measure: Measure, processes: int, scratch: Path
+) -> Iterator[Result]:
     """What becomes of cases, in their order, on some processes.
 
     Raises:
-        ActuatedCharactersError: a name or a value of a case is wrong.
-        BrokenProcessPool: a process died.
+        ActuatedCharactersError: a name or a value of a case is wrong, or the processes died.
     """
-    with WorkerProcesses(processes, limit_threads) as pool:
-        waiting = [pool.submit(attempt, case, measure) for case in cases]
-        for case, one in zip(cases, waiting, strict=True):
-            yield case, one.result()
+    with local_cluster(processes, scratch) as client:
+        found = results_in_order(client, partial(attempt, measure=measure), cases)
+        yield from zip(cases, found, strict=True)
 
 
 def rows(done: Sequence[Result]) -> Iterator[tuple[str, ...]]:

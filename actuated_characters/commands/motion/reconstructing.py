@@ -1,7 +1,6 @@
 """The command `actuated_characters motion reconstruct`: a clip by joint torques alone."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.skin_options import given_skin
 from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
-from msgs_config.runtime.extras import require_extra
+from msgs_config.runtime.extras import hint, require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.reconstruction.reconstruction import Job
@@ -82,8 +81,15 @@ def _add_search(command: argparse.ArgumentParser) -> None:
         "not foreseen; the run has it as well",
         ", such as controller_node.plan.samples:=64",
     )
-    command.add_argument(
-        "--workers", type=int, metavar="N", help="processes (as many as there are cores)"
+    where = command.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes (as many as there are processors; more than one need the extra 'sweep')",
+    )
+    where.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of any cluster of Dask: tcp://HOST:PORT"
     )
     command.add_argument(
         "--view",
@@ -110,10 +116,17 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import SearchSettings
+    from actuated_characters.reconstruction.workers import has_dask, usual_count
 
-    workers = options.workers if options.workers is not None else os.cpu_count() or 1
+    if options.scheduler is not None:
+        require_extra("sweep", "--scheduler")
+    workers = usual_count() if options.workers is None else options.workers
+    if options.workers is None and not has_dask():
+        print(f"on one processor; for all of them: {hint('sweep')}")
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
+    if workers > 1:
+        require_extra("sweep", "--workers above 1")
     output = _output(options)
     given = node_settings(options.set, NODES)
     for name in _OWN:
@@ -135,7 +148,7 @@ def _job(options: argparse.Namespace) -> "Job":
     problem.check()  # mistakes are reported before anything begins
     if options.output is None:
         output.parent.mkdir(exist_ok=True)
-    return Job(problem, settings, output, workers, options.resume)
+    return Job(problem, settings, output, workers, options.resume, options.scheduler)
 
 
 def _output(options: argparse.Namespace) -> Path:

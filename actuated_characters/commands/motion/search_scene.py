@@ -1,7 +1,6 @@
 """Plays a scene that is a search for a motion, and then what it has found."""
 
 import argparse
-import os
 from pathlib import Path
 
 from actuated_characters.commands.common.interruption import check_interruption
@@ -11,6 +10,7 @@ from actuated_characters.reconstruction.checkpoint import checkpoint_path
 from actuated_characters.reconstruction.problem import Problem, duration_of
 from actuated_characters.reconstruction.reconstruction import Job
 from actuated_characters.reconstruction.search import SearchSettings
+from actuated_characters.reconstruction.workers import usual_count
 from actuated_characters.scenes.scene import CONTROLLER, SIMULATOR, Scene
 from msgs_config.errors import ConfigurationError
 from msgs_config.settings import Settings, parameter
@@ -68,4 +68,4 @@ def _job(scene: Scene, output: Path, most_seconds: float) -> Job:
     settings = SearchSettings(motion.worlds, motion.kept, motion.window, motion.seed)
     settings.check()
     problem.check()
-    return Job(problem, settings, output, os.cpu_count() or 1)
+    return Job(problem, settings, output, usual_count())
