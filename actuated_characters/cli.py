@@ -26,6 +26,7 @@ from actuated_characters.commands.replay import add_replay
 from actuated_characters.commands.report import add_report
 from actuated_characters.commands.run import add_run
 from actuated_characters.commands.search import add_search
+from actuated_characters.commands.shrink import add_shrink
 from actuated_characters.commands.sweep import add_sweep
 from actuated_characters.commands.take import add_take
 from actuated_characters.commands.train.command import add_train
@@ -70,8 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     for add in (
         *(add_run, add_play, add_view, add_fork, add_render, add_replay, add_info, add_report),
         *(add_compare, add_export, add_motion, add_author, add_take, add_train, add_explain),
-        add_sweep,
-        add_search,
+        *(add_sweep, add_search, add_shrink),
     ):
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them

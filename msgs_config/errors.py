@@ -61,6 +61,10 @@ class RunError(ActuatedCharactersError):
     """A run could not be started, or one of its processes failed."""
 
 
+class RefusedError(RunError):
+    """A node does not take what it is sent, or does not do what it is asked for."""
+
+
 class SimulationError(ActuatedCharactersError):
     """The simulation cannot go on: it diverged, or a command never came."""
 

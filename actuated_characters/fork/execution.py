@@ -7,7 +7,7 @@ from pathlib import Path
 
 from actuated_characters.bags.forked_from import KEY
 from actuated_characters.bags.recording import Recording
-from actuated_characters.fork.node import ForkNode
+from actuated_characters.fork.node import ForkNode, Script
 from actuated_characters.fork.plan import ForkPlan
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import (
@@ -32,16 +32,23 @@ def run_fork(
     *,
     progress: Progress = lambda ticks: None,
     through_topics: bool = False,
+    script: Script | None = None,
 ) -> None:
     """Run a fork in this process, or over topics; its directory, prepared, gets what a run's gets.
+
+    A `script`, in this process alone, is sent in the place of what the fork repeats.
 
     Raises:
         ActuatedCharactersError: one of the nodes failed, or a state up to the fork is not the
             recorded one.
     """
-    run = run_over_topics if through_topics else partial(run_in_process, make_sender=ForkNode)
+    run = (
+        run_over_topics
+        if through_topics
+        else partial(run_in_process, make_sender=partial(ForkNode, script=script))
+    )
     run(
-        _with_files(fork.plan, fork.recording, directory / PARAMETERS),
+        with_files(fork.plan, fork.recording, directory / PARAMETERS),
         directory,
         write_bag=True,
         progress=lambda ticks: progress(max(ticks - fork.skipped, 0)),
@@ -52,7 +59,7 @@ def run_fork(
     )
 
 
-def _with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
+def with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
     """A plan whose files have the recorded texts: today's files, or else some that are written."""
     terrain, both = recording.world.terrain, dict[str, str]()
     if not _is_unchanged(recording):

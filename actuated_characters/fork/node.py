@@ -5,7 +5,8 @@ them. Up to the fork it compares each state with the recorded one.
 """
 
 import json
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from actuated_characters.bags.keyframes import KeyframePlace
-from actuated_characters.bags.recording import read_recordings
-from actuated_characters.fork.inputs import ForkPoint, Stop, recorded_stops
+from actuated_characters.bags.recording import Recording, read_recordings
+from actuated_characters.fork.inputs import ForkPoint, Stop, Stops, recorded_stops
 from actuated_characters.replay.comparison import (
     EFFORT,
     POSITION,
@@ -81,11 +82,22 @@ _SERVICES = {"pause": True, "step": False, "reset": False}  # whether each takes
 _HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
 
 
+@dataclass(frozen=True)
+class Script:
+    """What a run is sent that begins as a recording does, and how far it is compared with that."""
+
+    recording: Recording
+    first_tick: int  # of row 0
+    row: int  # the last state that is compared; -1: none
+    stops: Stops
+    requests: Mapping[int, Sequence[tuple[str, bytes]]]  # topic and message, as those of a bag
+
+
 class ForkNode(Player):
     """Steps the simulator from input to input, and lets it run after the last one."""
 
-    def __init__(self, node: BusNode | None = None) -> None:
-        """Read the recording and the new inputs.
+    def __init__(self, node: BusNode | None = None, script: Script | None = None) -> None:
+        """Play a script; without one read the recording and the new inputs.
 
         Without a place on a bus it is a node of ROS.
 
@@ -94,17 +106,10 @@ class ForkNode(Player):
         """
         super().__init__(node or ros_node("fork"), silent=True)
         settings = declared_settings(self.node, ForkSettings)
-        path, self._row = Path(settings.recording), settings.row
-        stamp_ns, log_time_ns = settings.stamp_ns, settings.log_time_ns
-        begin = KeyframePlace(stamp_ns, log_time_ns) if stamp_ns else None
-        self._recording = recording = read_recordings(path, begin)[0]
-        point = ForkPoint(self._row, settings.ticks, settings.later_inputs)
-        self._stops = recorded_stops(recording, point)
-        pace = float(recording.parameters.get(_PACE) or 0.0)
-        self._tick_clock, self._first_tick = clock_of(recording), first_tick_of(recording)
-        self._add_new(pace, settings)
-        rare = read_rare_messages(path, recording).requests
-        self._requests = {row: rare[row] for row in rare if point.repeats(row)}
+        script = script or _read_script(settings)
+        self._recording, self._row = script.recording, script.row
+        self._stops, self._requests = script.stops, script.requests
+        self._tick_clock, self._first_tick = clock_of(script.recording), script.first_tick
         self._session = settings.session.id
         self._throw_codec = ThrowCodec(self._session)
         self._state_decoder, self._torque_decoder = JointStateDecoder(), JointStateDecoder()
@@ -148,6 +153,8 @@ class ForkNode(Player):
         self._torques = self.node.subscription(topics.JOINT_TORQUES)
         self._states = self.node.subscription(topics.JOINT_STATES)  # which the simulator awaits
         yield from self._wait_for_answer(0, np.inf)
+        if self._row < 0:
+            yield from self._end_comparison()
         yield from self._call("pause")
         yield from self._set(topics.SIM_NODE, {_PACE: 0.0})
         present = 0
@@ -264,30 +271,52 @@ class ForkNode(Player):
             raise ReplayError("; ".join(filter(None, (str(difference), changed))))
         self._compared += 1
 
-    def _add_new(self, pace: float, settings: ForkSettings) -> None:
-        """Add the new inputs to stops: parameters at the fork, others in their episode.
 
-        From the fork on the simulator has the recorded `pace`, unless there is a new one.
-        """
-        stops, row, new = self._stops, self._row, json.loads(settings.settings)
-        if controller := new.get(topics.CONTROLLER_NODE):
-            stops[row].settings.append((topics.CONTROLLER_NODE, controller))
-        simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
-        if simulator:  # its parameters count from the tick on that begins in the state
-            stops[row + 1].settings.append((topics.SIM_NODE, simulator))
-        begins = [row, *(each for each, stop in stops.items() if stop.resets)]
+def _read_script(settings: ForkSettings) -> Script:
+    """The script of a fork: what is recorded, as far as it is repeated, and what is new.
 
-        def stop_of(planned: Planned) -> Stop:
-            at = self._tick_clock.tick(planned.stamp_ns) - self._first_tick
-            return stops[max(begin for begin in begins if begin <= at) + 1]
+    Raises:
+        ActuatedCharactersError: the recording cannot be repeated.
+    """
+    path, row = Path(settings.recording), settings.row
+    stamp_ns, log_time_ns = settings.stamp_ns, settings.log_time_ns
+    begin = KeyframePlace(stamp_ns, log_time_ns) if stamp_ns else None
+    recording = read_recordings(path, begin)[0]
+    point = ForkPoint(row, settings.ticks, settings.later_inputs)
+    rare = read_rare_messages(path, recording).requests
+    requests = {row: rare[row] for row in rare if point.repeats(row)}
+    stops = recorded_stops(recording, point)
+    script = Script(recording, first_tick_of(recording), row, stops, requests)
+    _add_new(script, settings)
+    return script
 
-        if settings.strengths:
-            stops[row].strengths += read_strengths(Path(settings.strengths))
-        if settings.behaviours:
-            stops[row].behaviours += read_behaviours(Path(settings.behaviours))
-        for push in read_pushes(Path(settings.file)):
-            stop_of(push).pushes.append(push)
-        for pin in read_pins(Path(settings.pins)) if settings.pins else ():
-            stop_of(pin).pins.append(pin)
-        for throw in read_throws(Path(settings.throws)):
-            stop_of(throw).throws.append(throw)
+
+def _add_new(script: Script, settings: ForkSettings) -> None:
+    """Add the new inputs to stops: parameters at the fork, others in their episode.
+
+    From the fork on the simulator has the recorded pace, unless there is a new one.
+    """
+    stops, row, new = script.stops, script.row, json.loads(settings.settings)
+    pace = float(script.recording.parameters.get(_PACE) or 0.0)
+    clock = clock_of(script.recording)
+    if controller := new.get(topics.CONTROLLER_NODE):
+        stops[row].settings.append((topics.CONTROLLER_NODE, controller))
+    simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
+    if simulator:  # its parameters count from the tick on that begins in the state
+        stops[row + 1].settings.append((topics.SIM_NODE, simulator))
+    begins = [row, *(each for each, stop in stops.items() if stop.resets)]
+
+    def stop_of(planned: Planned) -> Stop:
+        at = clock.tick(planned.stamp_ns) - script.first_tick
+        return stops[max(begin for begin in begins if begin <= at) + 1]
+
+    if settings.strengths:
+        stops[row].strengths += read_strengths(Path(settings.strengths))
+    if settings.behaviours:
+        stops[row].behaviours += read_behaviours(Path(settings.behaviours))
+    for push in read_pushes(Path(settings.file)):
+        stop_of(push).pushes.append(push)
+    for pin in read_pins(Path(settings.pins)) if settings.pins else ():
+        stop_of(pin).pins.append(pin)
+    for throw in read_throws(Path(settings.throws)):
+        stop_of(throw).throws.append(throw)

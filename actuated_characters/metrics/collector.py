@@ -72,6 +72,10 @@ class MetricsCollector:
             return 0
         return self._states_too_early + self._assembler.missing_ticks
 
+    def has_fallen(self) -> bool:
+        """Whether the character has fallen so far; False where that is not known."""
+        return self._configuration is not None and self._measurement.has_fallen()
+
     def take(self, topic: str, raw: bytes, published_ns: int | None) -> None:
         """Take a serialised message that was published at a wall time in ns; None if not known.
 

@@ -179,6 +179,10 @@ class Measurement:
             fell |= {"fell_at_s": time, "fell_in_mode": modes[-1] if modes else None}
         return fell
 
+    def has_fallen(self) -> bool:
+        """Whether the character has fallen so far; False where that is not known."""
+        return bool(self._describe_fall(self.series())["fell"])
+
     def _slider_errors(self, series: Series) -> FloatArray:
         """Distance of each slider from its reference in each tick, m."""
         names = [slider_columns(joint.name) for joint in self._sliders]

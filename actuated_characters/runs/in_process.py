@@ -1,7 +1,7 @@
 """Runs in this process, without ROS: the nodes of a run over topics, on a bus of their own."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,7 @@ from sim_node.node_settings import NodeSettings
 
 _PROGRESS_PERIOD = 0.1  # s between words on the progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
+_NO_MAKERS: Mapping[str, Callable[[BusNode], ComposableNode]] = {}
 _MAKERS: Mapping[str, Callable[[BusNode], ComposableNode]] = {
     topics.SIM_NODE: SimNode,
     topics.CONTROLLER_NODE: ControllerNode,
@@ -38,7 +39,7 @@ def run_together(
     given: Mapping[str, Mapping[str, object]],
     directory: Path,
     progress: Progress = lambda ticks: None,
-    makers: Mapping[str, Callable[[BusNode], ComposableNode]] = _MAKERS,
+    makers: Mapping[str, Callable[[BusNode], ComposableNode]] = _NO_MAKERS,
 ) -> None:
     """Run a recorder and other nodes on a bus of this process, until one of them ends.
 
@@ -55,7 +56,6 @@ def run_together(
         ActuatedCharactersError: one of the nodes failed.
         RunError: it was interrupted by a signal, whose own handler raised nothing.
     """
-    makers = {**_MAKERS, **makers}
     bus = Bus(partial(_log, directory / LOGS))
     places: dict[str, InProcessNode] = {}
     for full_name, parameters in given.items():
@@ -65,15 +65,32 @@ def run_together(
     with (
         signals_held(most=2) as stop,
         _recorder(recording, progress, stop) as recorder,
-        ExitStack() as at_end,
     ):
-        nodes: list[ComposableNode] = [recorder]
-        for place in places.values():
+        run_made(recorder, places.values(), makers, stop)
+    if stop:
+        raise RunError("the run was interrupted by a signal")
+
+
+def run_made(
+    listener: ComposableNode,
+    places: Iterable[InProcessNode],
+    makers: Mapping[str, Callable[[BusNode], ComposableNode]],
+    stop: StopFlag,
+) -> None:
+    """Make nodes at their places, beside one that is there already, and run all until one ends.
+
+    Those beside simulator and controller have their `makers`, by their names.
+
+    Raises:
+        ActuatedCharactersError: one of the nodes failed.
+    """
+    makers = {**_MAKERS, **makers}
+    with ExitStack() as at_end:
+        nodes: list[ComposableNode] = [listener]
+        for place in places:
             nodes.append(makers[place.get_name()](place))
             at_end.callback(nodes[-1].destroy_node)
         run_nodes(nodes, stop)
-    if stop:
-        raise RunError("the run was interrupted by a signal")
 
 
 def run_in_process(

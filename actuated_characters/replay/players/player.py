@@ -6,7 +6,7 @@ from typing import Any
 
 from msgs_config.bus.composition import UNTIL_A_MESSAGE, ComposableNode, Turns
 from msgs_config.bus.node import Answer, BusNode, Client, Executor, Publisher, StopFlag
-from msgs_config.errors import RunError
+from msgs_config.errors import RefusedError, RunError
 
 ANSWER_TIMEOUT = 60.0
 """s that an answer may take, on a machine that may be busy with other things."""
@@ -75,7 +75,12 @@ class Player(ComposableNode):
             print(f"{STATE}{count}", flush=True)
 
     def set_parameters(self, client: Client, node: str, settings: Mapping[str, Any]) -> Turns:
-        """Set parameters of a node. Raises RunError if it rejects one, or does not answer."""
+        """Set parameters of a node.
+
+        Raises:
+            RefusedError: it rejects one.
+            RunError: it does not answer.
+        """
         names = some_of(list(settings))
         answer = client.set_parameters(settings)
         yield from self.wait(lambda: answer.is_given, lambda: f"{node} to accept {names}")
@@ -84,7 +89,12 @@ class Player(ComposableNode):
     def call(
         self, client: Client, node: str, service: str, *, flag: bool = True, timeout: float
     ) -> Turns:
-        """Call a service of a node. Raises RunError if it does not do it, or does not answer."""
+        """Call a service of a node.
+
+        Raises:
+            RefusedError: it does not do it.
+            RunError: it does not answer.
+        """
         answer = client.call(service, flag)
         yield from self.wait(lambda: answer.is_given, lambda: f"{node} to {service}", timeout)
         _check(answer, f"{node} did not {service}")
@@ -97,9 +107,9 @@ class Player(ComposableNode):
 
 
 def _check(answer: Answer, failure: str) -> None:
-    """Raise RunError if an answer, given before this node was to stop, is a refusal."""
+    """Raise RefusedError if an answer, given before this node was to stop, is a refusal."""
     if answer.is_given and not answer.success:
-        raise RunError(f"{failure}: {answer.message}")
+        raise RefusedError(f"{failure}: {answer.message}")
 
 
 def some_of(names: list[str]) -> str:

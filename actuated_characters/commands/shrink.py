@@ -1,0 +1,111 @@
+"""The command `actuated_characters shrink`: the fewest and smallest inputs with which it falls."""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.progress import say
+from actuated_characters.commands.common.settings import Commands, add_bag, add_command
+from msgs_config.errors import ConfigurationError
+
+if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.shrink.minimal import Sizes
+    from actuated_characters.shrink.shrinking import Shrinking, Trials
+
+
+def add_shrink(commands: "Commands[argparse.ArgumentParser]") -> None:
+    """Add the command to those of `actuated_characters`."""
+    command = add_command(
+        commands,
+        _shrink,
+        "shrink",
+        "the fewest and smallest inputs with which a run still falls",
+        "Of a recorded run whose character fell, find the fewest and smallest inputs with which it "
+        "still falls: pushes, balls, commanded velocities, changed parameters. Without any of them "
+        "it does not fall, nor with 5 % less of one. The result is a run of its own, which can be "
+        "replayed. Ctrl-C keeps the best so far.",
+        ["shrink runs/felled"],
+    )
+    add_bag(command)
+    command.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="where the results go (RUN-shrunk, with a number if it exists)",
+    )
+    command.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
+
+
+def _shrink(options: argparse.Namespace) -> None:
+    from actuated_characters.bags.format.metadata import BAG
+    from actuated_characters.recorder.run_directory import (
+        prepare_directory,
+        prepare_free_directory,
+    )
+    from actuated_characters.shrink.shrinking import Trials, plan_shrinking
+
+    run = options.bag.absolute()
+    run = run.parent if run.name == BAG else run
+    directory = (options.output or run.with_name(f"{run.name}-shrunk")).absolute()
+    if directory.resolve() == run.resolve():
+        raise ConfigurationError(f"--output {directory} is the run that is to be shrunk")
+    shrinking = plan_shrinking(options.bag)
+    for warning in shrinking.fork.warnings:
+        print(warning)
+    if options.output is None and not options.overwrite:
+        directory = prepare_free_directory(directory)
+    else:
+        prepare_directory(directory, overwrite=options.overwrite)
+    check_interruption()  # all modules are imported by now
+    with tempfile.TemporaryDirectory() as folder:
+        trials = Trials(shrinking, Path(folder))
+        try:
+            sizes = _searched(trials)
+        except KeyboardInterrupt:
+            if trials.best is None:
+                raise
+            say("interrupted; the best so far, which may not be the least:")
+            _write(shrinking, trials.best, directory)
+            raise
+    _write(shrinking, sizes, directory)
+
+
+def _searched(trials: "Trials") -> "Sizes":
+    """Have the trials done; shows how far they are."""
+    from actuated_characters.shrink.shrinking import shrink
+
+    total = trials.shrinking.total
+    with Console(stderr=True).status("") as status:
+
+        def report(trials: "Trials") -> None:
+            best = trials.best or dict.fromkeys(trials.shrinking.order, 1.0)
+            shares = ", ".join(f"{100.0 * size:.3g} %" for size in best.values())
+            left = f"{len(best)} of {total} inputs left" + (f" ({shares})" if trials.best else "")
+            status.update(f"trial {trials.count}: {left}")
+
+        trials.report = report
+        return shrink(trials)
+
+
+def _write(shrinking: "Shrinking", sizes: "Sizes", directory: Path) -> None:
+    """Run what is left into a directory, and say what it is."""
+    from actuated_characters.bags.format.metadata import BAG
+    from actuated_characters.recorder.run_directory import read_metrics
+    from actuated_characters.report.metrics_plot import plot_metrics
+    from actuated_characters.shrink.shrinking import run_shrunk
+
+    run_shrunk(shrinking, sizes, directory)
+    plot_metrics(directory)
+    metrics = read_metrics(directory)[0]
+    total = shrinking.total
+    if not sizes:
+        print(f"it falls at {metrics['fell_at_s']:.3g} s without any of its {total} inputs")
+    else:
+        print(f"{len(sizes)} of {total} inputs; it falls at {metrics['fell_at_s']:.3g} s with")
+    for line in shrinking.describe(sizes):
+        print(f"  {line}")
+    print(f"the run: {directory / BAG}")

@@ -1,0 +1,1 @@
+"""From a run that fell: the fewest and smallest inputs with which it still falls."""
