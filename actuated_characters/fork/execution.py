@@ -7,8 +7,9 @@ from pathlib import Path
 
 from actuated_characters.bags.forked_from import KEY
 from actuated_characters.bags.recording import Recording
-from actuated_characters.fork.node import ForkNode, Script
+from actuated_characters.fork.node import ForkNode
 from actuated_characters.fork.plan import ForkPlan
+from actuated_characters.fork.script import Script
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import (
     write_character,

@@ -4,35 +4,24 @@ It does what any node may do: it pauses the simulator, takes steps, and calls se
 them. Up to the fork it compares each state with the recorded one.
 """
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from actuated_characters.bags.keyframes import KeyframePlace
-from actuated_characters.bags.recording import Recording, read_recordings
-from actuated_characters.fork.inputs import ForkPoint, Stop, Stops, recorded_stops
+from actuated_characters.fork.inputs import Stop
+from actuated_characters.fork.script import PACE, ForkSettings, Script, read_script
 from actuated_characters.replay.comparison import (
     EFFORT,
     POSITION,
     VELOCITY,
     clock_of,
     first_difference,
-    first_tick_of,
 )
 from actuated_characters.replay.players.controller_parameters import late_topics
 from actuated_characters.replay.players.player import ANSWER_TIMEOUT, Player
-from actuated_characters.replay.players.simulator_outputs import REQUESTS, read_rare_messages
-from actuated_characters.runs.planned.behaviours import read_behaviours
-from actuated_characters.runs.planned.files import Planned
-from actuated_characters.runs.planned.pins import read_pins
-from actuated_characters.runs.planned.strengths import read_strengths
-from actuated_characters.runs.planned.throws import read_throws
-from actuated_characters.runs.planned.wrenches import read_pushes
+from actuated_characters.replay.players.simulator_outputs import REQUESTS
 from msgs_config.bus.composition import Turns, ros_node
 from msgs_config.bus.node import BusNode, Publisher, Subscription, declared_settings
 from msgs_config.errors import ReplayError
@@ -40,57 +29,16 @@ from msgs_config.messages import topics
 from msgs_config.messages.joint_state import JointStateDecoder, state_in_layout
 from msgs_config.messages.pins import encode_pins
 from msgs_config.messages.projectiles import ThrowCodec
-from msgs_config.messages.session import GivenSession, read_session
+from msgs_config.messages.session import read_session
 from msgs_config.messages.state import StampedState
 from msgs_config.messages.wrenches import encode_wrenches
-from msgs_config.settings import Settings, parameter
 from msgs_config.versions import describe_changes, installed_versions
 
-_LATEST = 2**62  # ns
 _STRENGTH = topics.STRENGTH.of(topics.CONTROLLER_NODE)
 _BEHAVIOUR = topics.BEHAVIOUR.of(topics.CONTROLLER_NODE)
-
-
-class ForkSettings(Settings):
-    """Which run is forked where, and what is new from there on."""
-
-    recording: str = parameter("", "the bag, or the directory of its run")
-    stamp_ns: int = parameter(
-        0, "of the keyframe that the recording is read from; 0: all", maximum=_LATEST
-    )
-    log_time_ns: int = parameter(0, "of that keyframe in the bag", maximum=_LATEST)
-    row: int = parameter(0, "state from which on the fork differs, the first one being 0")
-    ticks: int = parameter(1, "length of what is repeated and of what is new")
-    later_inputs: bool = parameter(True, "repeat what was sent from that state on, too")
-    settings: str = parameter("{}", "new parameters of nodes from that state on, JSON by node")
-    file: str = parameter("pushes.json", "new pushes, as a run writes them")
-    throws: str = parameter("throws.json", "new throws, as a run writes them")
-    pins: str = parameter("", "new pins, as a run writes them; empty: none")
-    strengths: str = parameter("", "new strengths, as a run writes them; empty: none")
-    behaviours: str = parameter("", "new behaviours, as a run writes them; empty: none")
-    wait_for_subscribers: int = parameter(1, "begin when this many subscribe to external_wrench")
-    throw_subscribers: int = parameter(1, "likewise to throw")
-    pin_subscribers: int = parameter(1, "likewise to pin")
-    strength_subscribers: int = parameter(1, "likewise to controller_node/strength")
-    behaviour_subscribers: int = parameter(1, "likewise to controller_node/behaviour")
-    session: GivenSession = GivenSession()
-
-
-_PACE = "real_time_factor"
 _REST = 0.01  # s between looks at the topics: one waking up for many messages
 _SERVICES = {"pause": True, "step": False, "reset": False}  # whether each takes a flag
 _HELD_PACE = 1e-9  # of it: the first tick is years away, while states and their answers pass
-
-
-@dataclass(frozen=True)
-class Script:
-    """What a run is sent that begins as a recording does, and how far it is compared with that."""
-
-    recording: Recording
-    first_tick: int  # of row 0
-    row: int  # the last state that is compared; -1: none
-    stops: Stops
-    requests: Mapping[int, Sequence[tuple[str, bytes]]]  # topic and message, as those of a bag
 
 
 class ForkNode(Player):
@@ -106,7 +54,7 @@ class ForkNode(Player):
         """
         super().__init__(node or ros_node("fork"), silent=True)
         settings = declared_settings(self.node, ForkSettings)
-        script = script or _read_script(settings)
+        script = script or read_script(settings)
         self._recording, self._row = script.recording, script.row
         self._stops, self._requests = script.stops, script.requests
         self._tick_clock, self._first_tick = clock_of(script.recording), script.first_tick
@@ -148,7 +96,7 @@ class ForkNode(Player):
         # no limit for the start: the command that has started all knows one
         yield from self.wait(self._is_connected, lambda: "simulator and controller", np.inf)
         # the first tick is held by its time: a paused simulator would not repeat the first state
-        yield from self._set(topics.SIM_NODE, {_PACE: _HELD_PACE})
+        yield from self._set(topics.SIM_NODE, {PACE: _HELD_PACE})
         yield from self._send(0)
         self._torques = self.node.subscription(topics.JOINT_TORQUES)
         self._states = self.node.subscription(topics.JOINT_STATES)  # which the simulator awaits
@@ -156,7 +104,7 @@ class ForkNode(Player):
         if self._row < 0:
             yield from self._end_comparison()
         yield from self._call("pause")
-        yield from self._set(topics.SIM_NODE, {_PACE: 0.0})
+        yield from self._set(topics.SIM_NODE, {PACE: 0.0})
         present = 0
         for row in sorted({*self._stops, *self._requests, self._row + 1} - {0}):
             if self.stop:
@@ -270,53 +218,3 @@ class ForkNode(Player):
             changed = describe_changes(self._recording.versions, installed_versions())
             raise ReplayError("; ".join(filter(None, (str(difference), changed))))
         self._compared += 1
-
-
-def _read_script(settings: ForkSettings) -> Script:
-    """The script of a fork: what is recorded, as far as it is repeated, and what is new.
-
-    Raises:
-        ActuatedCharactersError: the recording cannot be repeated.
-    """
-    path, row = Path(settings.recording), settings.row
-    stamp_ns, log_time_ns = settings.stamp_ns, settings.log_time_ns
-    begin = KeyframePlace(stamp_ns, log_time_ns) if stamp_ns else None
-    recording = read_recordings(path, begin)[0]
-    point = ForkPoint(row, settings.ticks, settings.later_inputs)
-    rare = read_rare_messages(path, recording).requests
-    requests = {row: rare[row] for row in rare if point.repeats(row)}
-    stops = recorded_stops(recording, point)
-    script = Script(recording, first_tick_of(recording), row, stops, requests)
-    _add_new(script, settings)
-    return script
-
-
-def _add_new(script: Script, settings: ForkSettings) -> None:
-    """Add the new inputs to stops: parameters at the fork, others in their episode.
-
-    From the fork on the simulator has the recorded pace, unless there is a new one.
-    """
-    stops, row, new = script.stops, script.row, json.loads(settings.settings)
-    pace = float(script.recording.parameters.get(_PACE) or 0.0)
-    clock = clock_of(script.recording)
-    if controller := new.get(topics.CONTROLLER_NODE):
-        stops[row].settings.append((topics.CONTROLLER_NODE, controller))
-    simulator = ({_PACE: pace} if pace else {}) | new.get(topics.SIM_NODE, {})
-    if simulator:  # its parameters count from the tick on that begins in the state
-        stops[row + 1].settings.append((topics.SIM_NODE, simulator))
-    begins = [row, *(each for each, stop in stops.items() if stop.resets)]
-
-    def stop_of(planned: Planned) -> Stop:
-        at = clock.tick(planned.stamp_ns) - script.first_tick
-        return stops[max(begin for begin in begins if begin <= at) + 1]
-
-    if settings.strengths:
-        stops[row].strengths += read_strengths(Path(settings.strengths))
-    if settings.behaviours:
-        stops[row].behaviours += read_behaviours(Path(settings.behaviours))
-    for push in read_pushes(Path(settings.file)):
-        stop_of(push).pushes.append(push)
-    for pin in read_pins(Path(settings.pins)) if settings.pins else ():
-        stop_of(pin).pins.append(pin)
-    for throw in read_throws(Path(settings.throws)):
-        stop_of(throw).throws.append(throw)

@@ -34,13 +34,16 @@ def shrunk(
         return fails(dict.fromkeys(numbers, 1.0))
 
     kept: Sizes = dict.fromkeys(fewest(order, fails_as_they_are), 1.0)
-    while True:
+    tried, before = set[int](), None
+    while kept != before:
         before = kept
-        for number in kept.keys() & set(scalable):
-            kept = _with_smallest(kept, number, fails)
+        for number in [each for each in kept if each in scalable]:
+            smaller = {**kept, number: (1.0 - SHARE) * kept[number]}
+            if number not in tried or fails(smaller):
+                kept = _with_smallest(kept, number, fails)
+            tried.add(number)
         kept = _without_needless(kept, fails)
-        if kept == before:
-            return kept
+    return kept
 
 
 def _with_smallest(kept: Sizes, number: int, fails: Callable[[Sizes], bool]) -> Sizes:
@@ -112,17 +115,15 @@ def _failing_part(
 def smallest_size(fails: Callable[[float], bool], size: float) -> float:
     """A size of which `SHARE` less does not fail, at most a given one, which does.
 
-    First that much less is tried, and only if that fails the half, and so on between the least that
-    fails and what does not. Less than a thousandth is not tried.
+    It halves what lies between the least that fails and what does not, to begin with nothing. Less
+    than a thousandth is not tried.
     """
-    below = (1.0 - 2.0 * SHARE) * size  # does not fail, as far as is known
-    is_guess = True
+    below = 0.0  # does not fail
     while size > _LEAST:
         smaller = (1.0 - SHARE) * size
         half = float(f"{0.5 * (below + size):.{_DIGITS}g}")  # which is shorter to write
         probe = smaller if below >= (1.0 - 2.0 * SHARE) * size else half
         if fails(probe):
-            below, is_guess = (0.0 if is_guess else below), False
             size = probe
         elif probe == smaller:
             break

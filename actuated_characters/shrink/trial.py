@@ -8,7 +8,8 @@ from pathlib import Path
 
 from actuated_characters.bags.recording import Recording
 from actuated_characters.fork.inputs import Stop, Stops
-from actuated_characters.fork.node import ForkNode, Script
+from actuated_characters.fork.node import ForkNode
+from actuated_characters.fork.script import Script
 from actuated_characters.metrics.collector import MetricsCollector
 from actuated_characters.replay.comparison import clock_of, first_tick_of
 from actuated_characters.replay.players.character_files import write_keyframe

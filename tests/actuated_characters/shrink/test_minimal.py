@@ -87,7 +87,7 @@ def test_a_size_is_the_least_to_five_percent(least: float) -> None:
     assert (1.0 - SHARE) * size < least
 
 
-def test_what_cannot_be_smaller_costs_one_trial() -> None:
+def test_what_cannot_be_smaller_was_tried_at_half_and_so_on() -> None:
     asked: list[float] = []
 
     def fails(size: float) -> bool:
@@ -95,7 +95,14 @@ def test_what_cannot_be_smaller_costs_one_trial() -> None:
         return False
 
     assert smallest_size(fails, 1.0) == 1.0
-    assert asked == [1.0 - SHARE]
+    assert asked == [0.5, 0.75, 0.875, 0.9375, 1.0 - SHARE]
+
+
+def test_a_smaller_size_is_found_where_five_percent_less_does_not_fail() -> None:
+    # fails from 0.3 to 0.9, and at 1
+    size = smallest_size(lambda size: 0.3 <= size <= 0.9 or size == 1.0, 1.0)
+
+    assert 0.3 <= size < 0.3 / (1.0 - SHARE)
 
 
 def test_a_size_is_that_of_a_hole_where_less_fails_again() -> None:
