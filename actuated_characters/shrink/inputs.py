@@ -16,6 +16,7 @@ from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.velocities import PlannedVelocity
 from actuated_characters.runs.planned.wrenches import PlannedPush
 
+_DIGITS = 12  # of the numbers of what was made smaller
 _LEAST_MASS = 1e-3  # kg, of a throw
 
 
@@ -174,7 +175,7 @@ class SettingInput(Input):
         if size == 1.0:
             return self.value
         between = [
-            begin + size * (end - begin)
+            _short(begin + size * (end - begin))
             for begin, end in zip(_entries(self.before), _entries(self.value), strict=True)
         ]
         if isinstance(self.value, list):
@@ -275,7 +276,12 @@ def _slower(velocity: PlannedVelocity, size: float) -> PlannedVelocity:
 
 def _scaled(values: Sequence[float], size: float) -> tuple[float, ...]:
     """Values of a size; a zero stays without a sign."""
-    return tuple(values) if size == 1.0 else tuple(size * each + 0.0 for each in values)
+    return tuple(values) if size == 1.0 else tuple(_short(size * each) for each in values)
+
+
+def _short(value: float) -> float:
+    """A value without the last digits of a product, so that it is short to write."""
+    return float(f"{value:.{_DIGITS}g}") + 0.0
 
 
 def _entries(value: Any) -> list[Any]:

@@ -22,7 +22,7 @@ LATER = 1.0
 """How much later than in the recording a fall may begin to count as one, s."""
 
 _Sent: TypeAlias = tuple[str, ...]  # the events before a state, as texts: lists have no hash
-_MOST_KEYFRAMES = 300  # that are kept; those of a planner have some megabytes
+_MOST_BYTES = 200_000_000  # of keyframes that are kept: those of a planner have some megabytes
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,9 @@ class Trials:
     def _keep(self, events: Sequence[Event], keyframes: Sequence[Keyframe]) -> None:
         for each in keyframes:
             self._keyframes[each.row, _before(events, each.row)] = each
-        while len(self._keyframes) > _MOST_KEYFRAMES:
-            del self._keyframes[next(iter(self._keyframes))]
+        excess = sum(each.size for each in self._keyframes.values()) - _MOST_BYTES
+        while excess > 0:
+            excess -= self._keyframes.pop(next(iter(self._keyframes))).size
 
     def _latest_keyframe(self, events: Sequence[Event]) -> Keyframe | None:
         """The last keyframe of a run that was sent the same before."""

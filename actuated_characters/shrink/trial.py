@@ -47,6 +47,11 @@ class Keyframe:
     simulator: bytes
     controller: bytes
 
+    @property
+    def size(self) -> int:
+        """In bytes."""
+        return len(self.simulator) + len(self.controller)
+
 
 @dataclass(frozen=True)
 class Outcome:

@@ -48,12 +48,12 @@ def test_a_push_is_sent_before_its_tick_with_a_share_of_its_force() -> None:
 
 
 def test_an_option_says_a_number_to_the_bit() -> None:
-    given = pushed(0, planned=push((123.456789, -0.1, 0.0)))
+    given = pushed(0, planned=push((1.0 / 3.0, -141.7, 0.0)))
 
-    (option,) = [given.describe(0.3)]
-
-    _, forces, _ = option.removeprefix("--push ").replace("@", ":").split(":")
-    assert [float(each) for each in forces.split(",")] == [0.3 * 123.456789, 0.3 * -0.1, 0.0]
+    assert given.describe(1.0) == "--push chest:0.3333333333333333,-141.7,0@0"
+    assert -141.7 * 0.712 == -100.89039999999999  # as floats have it
+    assert given.describe(0.712) == "--push chest:0.237333333333,-100.8904,0@0"
+    assert contents(given, 0.712) == [push((0.237333333333, -100.8904, 0.0))]
 
 
 def test_a_push_is_said_as_run_takes_it() -> None:

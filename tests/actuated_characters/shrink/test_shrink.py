@@ -88,8 +88,8 @@ def test_what_is_left_falls_and_less_of_it_does_not(
     assert force < 500.0
     same = run(tmp_path / "same", duration, "--push", f"chest:0,{found[1]},0@0.6")
     assert summary_of(same)["state_hash"] == summary_of(shrunk)["state_hash"]
-    less = (1.0 - SHARE) * float(f"{force / 500.0:.4g}") * 500.0  # near the least each bit counts
-    weaker = run(tmp_path / "less", duration, "--push", f"chest:0,{less!r},0@0.6")
+    less = f"{(1.0 - SHARE) * force:.12g}"  # near the least force each digit counts
+    weaker = run(tmp_path / "less", duration, "--push", f"chest:0,{less},0@0.6")
     assert not falls(weaker)
     assert duration == pytest.approx(float(summary_of(fallen)["fell_at_s"]) + 1.3, abs=0.01)  # type: ignore[arg-type]
 
