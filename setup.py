@@ -17,6 +17,7 @@ SHARED = {
     "launch": "*.launch.py",
     "config": "*.*",
     "examples": "*.*",
+    "examples/trials": "*",
     "examples/without_rclpy": "*",
 }
 setup(
@@ -39,6 +40,7 @@ setup(
         "actuated_characters": [
             "scenes/*.yaml",
             "scenes/data/*",
+            "trial/data/*.yaml",
             "viewer/editor/time_edits.*s",
             "viewer/recorded/time_bar.*s",
         ],

@@ -30,6 +30,8 @@ from actuated_characters.commands.shrink import add_shrink
 from actuated_characters.commands.sweep import add_sweep
 from actuated_characters.commands.take import add_take
 from actuated_characters.commands.train.command import add_train
+from actuated_characters.commands.trial import add_trial
+from actuated_characters.commands.verify import add_verify
 from actuated_characters.commands.view import add_view
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.ros_environment import check_domain_id
@@ -71,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     for add in (
         *(add_run, add_play, add_view, add_fork, add_render, add_replay, add_info, add_report),
         *(add_compare, add_export, add_motion, add_author, add_take, add_train, add_explain),
-        *(add_sweep, add_search, add_shrink),
+        *(add_sweep, add_search, add_shrink, add_trial, add_verify),
     ):
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them

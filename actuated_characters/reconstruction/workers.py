@@ -6,14 +6,13 @@ import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
 from actuated_characters.reconstruction.problem import Problem
 from actuated_characters.reconstruction.world import Branch, Grown, Lost, TrialWorld
-from msgs_config.runtime.extras import PACKAGES
+from msgs_config.runtime.extras import is_installed
 
 if TYPE_CHECKING:  # it takes a second to import, and is needed for several processes alone
     from distributed import Client
@@ -22,14 +21,9 @@ _one_at_a_time = Lock()  # a process with several threads has one engine at work
 _worlds: dict[str, TrialWorld] = {}  # of this process, by the search: one at most
 
 
-def has_dask() -> bool:
-    """Whether there can be more than one process."""
-    return all(map(find_spec, PACKAGES["sweep"]))
-
-
 def usual_count() -> int:
     """As many processes as there are processors, if there can be; else one."""
-    return len(os.sched_getaffinity(0)) if has_dask() else 1
+    return len(os.sched_getaffinity(0)) if is_installed("sweep") else 1
 
 
 class Workers:

@@ -26,7 +26,7 @@ th, td { border-bottom: 1px solid var(--line); padding: .15rem .9rem .15rem 0;
          text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
 th:first-child, td:first-child, td:nth-child(2):last-child { text-align: left; }
 tr:nth-child(even) td { background: var(--soft); }
-img { max-width: 100%; height: auto; background: white; border-radius: 6px; }
+img, video { max-width: 100%; height: auto; background: white; border-radius: 6px; }
 figure { margin: .7rem 0; } figcaption { font-size: .85rem; opacity: .75; }
 .verdict { font-size: 1.2rem; margin: 1rem 0; }
 .tiles { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1rem 0; }
@@ -59,8 +59,16 @@ class Illustration:
 
 
 @dataclass(frozen=True)
+class Film:
+    """A film beside the page."""
+
+    address: str  # relative to the page
+    text: str  # the caption
+
+
+@dataclass(frozen=True)
 class Section:
-    """A part of the page: pictures, the verdict with its tiles, tables, and remarks."""
+    """A part of the page: pictures, films, the verdict with its tiles, tables, and remarks."""
 
     title: str
     illustrations: Sequence[Illustration] = ()
@@ -69,6 +77,7 @@ class Section:
     verdict: str = ""  # a sentence after the pictures
     tiles: Sequence[tuple[str, str]] = ()  # name and value of figures that belong to the verdict
     chapter: str = ""  # a heading above, where a chapter begins
+    films: Sequence[Film] = ()
 
 
 def render_page(title: str, sections: Sequence[Section]) -> str:
@@ -87,6 +96,7 @@ def _section(section: Section) -> str:
     if section.title:
         parts.append(f"<h3>{escape(section.title)}</h3>\n")
     parts += map(_figure, section.illustrations)
+    parts += map(_film, section.films)
     if section.verdict:
         parts.append(f'<p class="verdict">{escape(section.verdict)}</p>\n')
     if section.tiles:
@@ -102,6 +112,14 @@ def _figure(illustration: Illustration) -> str:
     text = escape(illustration.text, quote=True)
     return (
         f'<figure><img alt="{text}" src="data:image/png;base64,{data}"/>'
+        f"<figcaption>{text}</figcaption></figure>\n"
+    )
+
+
+def _film(film: Film) -> str:
+    address, text = escape(film.address, quote=True), escape(film.text)
+    return (
+        f'<figure><video src="{address}" controls preload="metadata"></video>'
         f"<figcaption>{text}</figcaption></figure>\n"
     )
 

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from actuated_characters.recorder.run_directory import LOGS, write_parameters
+from actuated_characters.runs.foreign_controller import ForeignController
 from actuated_characters.runs.in_process import Progress
 from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.inputs import NO_INPUTS, PlannedInputs
-from actuated_characters.runs.processes import Child, Children, Member
+from actuated_characters.runs.processes import FOREIGN, Child, Children, Member
 from actuated_characters.runs.ros_domain import own_domain
 from actuated_characters.runs.senders import check_recorded, plan_senders
 from msgs_config.errors import RunError
@@ -22,13 +23,20 @@ from msgs_config.runtime.ros_environment import (
     is_discovery_off,
 )
 
-_START_TIMEOUT = 120.0  # s until the first answer, on a machine that may be busy with other things
+START_TIMEOUT = 120.0
+"""s until the first answer, on a machine that may be busy with other things."""
 _VIEWER_TIMEOUT = 30.0  # s until its page is there
 _POLL_PERIOD = 0.05  # s
 _SILENCE = 5.0  # s without a tick, after which the nodes' logs are of interest
 _SIGNS = ("waiting for ", "its type must be ")  # begin a node's warning about what does not come
+_CONTROLLERS = (FOREIGN, "controller_node")
+_REJECTED = "rejected"  # is what a simulator says of a command that it does not take
 _TICK = "tick "  # begins the recorder's lines about its progress
 _NOTHING_GIVEN: Mapping[str, object] = {}
+
+
+class ControllerError(RunError):
+    """A controller ended, gave no answer, or one with which the simulator could not go on."""
 
 
 def run_over_topics(
@@ -43,6 +51,8 @@ def run_over_topics(
     fork: Mapping[str, object] | None = None,
     resets: int = 0,
     viewer: Mapping[str, object] | None = None,
+    foreign: ForeignController | None = None,
+    start_timeout: float = START_TIMEOUT,
 ) -> None:
     """Run recorder, controller and simulator as processes; leaves the figures in a directory.
 
@@ -50,16 +60,18 @@ def run_over_topics(
     simulator are one process. `recording` has parameters of the recorder. `inputs` are sent by
     one more process; in lockstep all are there before the first tick. With
     parameters of the node `fork` that process repeats a recording, with so many resets. With those
-    of a `viewer` one more shows the characters in a browser.
+    of a `viewer` one more shows the characters in a browser. A `foreign` controller takes the
+    place of `controller_node`. The first answer has to come within `start_timeout` s.
 
     Raises:
+        ControllerError: the controller is to blame.
         RunError: one of the processes failed, or the simulator rejected a push or throw.
     """
     about = {"directory": str(directory), "write_bag": write_bag, "progress_period": 0.1}
     recording = {**recording, **about}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    senders = plan_senders(directory, inputs, recording, fork)
+    senders = plan_senders(directory, inputs, recording, fork, is_foreign=foreign is not None)
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)
@@ -67,12 +79,15 @@ def run_over_topics(
         if write_bag:
             recorder = children.start_node("recorder", recording, *session)
         sender = [children.start_node(name, given, *session) for name, given in senders.items()]
-        # of the torques, before the first answer, or a tick would go unrecorded
-        listeners = (2 + (fork is not None), 2 + len(sender))
-        loop = _start_loop(children, plan, session, listeners, composed=composed)
+        if foreign is not None:
+            loop = _start_foreign(children, plan, session, foreign, 1 + len(sender))
+        else:
+            # of the torques, before the first answer, or a tick would go unrecorded
+            listeners = (2 + (fork is not None), 2 + len(sender))
+            loop = _start_loop(children, plan, session, listeners, composed=composed)
         if recorder is None:
             recorder = _start_measuring(children, recording, session, environment)
-        wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress)
+        wait_for_end(loop[0], [*loop[1:], *sender, recorder], progress, start_timeout)
     if recorder.exit_code:
         raise RunError(f"recorder failed: {recorder.last_words()}")
     check_recorded(directory, plan.ticks - resets, inputs if fork is None else None)
@@ -137,6 +152,22 @@ def _start_loop(
     return [children.start_node("sim_node", plan.simulator, *arguments), controller]
 
 
+def _start_foreign(
+    children: Children,
+    plan: RunPlan,
+    session: Sequence[str],
+    foreign: ForeignController,
+    others: int,
+) -> list[Child]:
+    """Start simulator and anybody's controller, which need not know whom it should wait for.
+
+    The simulator begins when it and so many others subscribe to the states.
+    """
+    controller = children.start_foreign(foreign, session[1].partition(":=")[2], plan.controller)
+    awaited = f"sim_node:wait_for_subscribers:={foreign.subscriptions + others}"
+    return [children.start_node("sim_node", plan.simulator, *session, "-p", awaited), controller]
+
+
 @contextmanager
 def run_environment(directory: Path) -> Iterator[dict[str, str]]:
     """An environment that keeps the run's traffic on this machine, and to itself.
@@ -183,25 +214,38 @@ class _Silence:
                 print(line, flush=True)
 
 
-def wait_for_end(simulator: Member, others: Sequence[Member], progress: Progress) -> None:
+def wait_for_end(
+    simulator: Member,
+    others: Sequence[Member],
+    progress: Progress,
+    start_timeout: float = START_TIMEOUT,
+) -> None:
     """Wait until the simulator has ended well, and the others have not ended before."""
     recorder = others[-1]
-    start_deadline = time.monotonic() + _START_TIMEOUT
+    start_deadline = time.monotonic() + start_timeout
     ticks, silence = 0, _Silence([simulator, *others])
     while simulator.exit_code is None:
         for child in others:
             if child.exit_code is not None:
-                raise RunError(f"{child.name} failed: {child.last_words()}")
+                kind = ControllerError if child.name in _CONTROLLERS else RunError
+                raise kind(f"{child.name} failed: {child.last_words()}")
         for line in recorder.read_lines():
             if line.startswith(_TICK):
                 ticks = int(line.removeprefix(_TICK))
         progress(ticks)
         silence.watch_ticks(ticks)
         if ticks < 2 and time.monotonic() > start_deadline:
-            raise RunError(
-                f"no answer within {_START_TIMEOUT:g} s; {simulator.name} says: "
-                f"{simulator.last_words()}"
+            raise ControllerError(
+                f"no answer within {start_timeout:g} s; {simulator.name} says: "
+                f"{simulator.last_warning(0, _REJECTED) or simulator.last_words()}"
             )
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
-        raise RunError(f"{simulator.name} failed: {simulator.last_words()}")
+        kind = ControllerError if simulator.exit_code > 0 else RunError  # else it was killed
+        raise kind(f"{simulator.name} failed: {_reason(simulator)}")
+
+
+def _reason(simulator: Member) -> str:
+    """Why a simulator ended, and what it had said of the commands before."""
+    words, warning = simulator.last_words(), simulator.last_warning(0, _REJECTED)
+    return f"{words} (before: {warning})" if warning else words

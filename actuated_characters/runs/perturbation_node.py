@@ -38,6 +38,11 @@ class PerturbationSettings(Settings):
     strength_subscribers: int = parameter(1, "likewise to controller_node/strength", maximum=1000)
     pin_subscribers: int = parameter(1, "likewise to pin", maximum=1000)
     behaviour_subscribers: int = parameter(1, "likewise to controller_node/behaviour", maximum=1000)
+    heard_by: str = parameter(
+        topics.JOINT_TORQUES.name,
+        "the topic that it subscribes to when all is there; whoever waits for that misses nothing",
+        choices=(topics.JOINT_TORQUES.name, topics.JOINT_STATES.name),
+    )
     session: GivenSession = GivenSession()
 
 
@@ -45,9 +50,10 @@ _TIMEOUT = 10.0  # s until the simulator has the messages
 
 
 class PerturbationNode(ComposableNode):
-    """Sends what was planned, and only then subscribes to the torques.
+    """Sends what was planned, and only then subscribes to the torques, or to the states.
 
-    A controller that waits for that subscription answers no state before all of it is there.
+    A controller, or a simulator, that waits for that subscription does not begin before all of it
+    is there.
     """
 
     def __init__(self, node: BusNode | None = None) -> None:
@@ -60,6 +66,8 @@ class PerturbationNode(ComposableNode):
         """
         super().__init__(node or ros_node("pusher"))
         settings = declared_settings(self.node, PerturbationSettings)
+        known = {topic.name: topic for topic in (topics.JOINT_TORQUES, topics.JOINT_STATES)}
+        self._heard_by = known[settings.heard_by]
         self._outgoing = [
             _PlannedPublisher(self.node, topic, list(messages(Path(file))), subscribers)
             for topic, file, subscribers, messages in _planned(settings)
@@ -74,9 +82,9 @@ class PerturbationNode(ComposableNode):
             return
         for each in self._outgoing:
             each.send()
-        torques = self.node.subscription(topics.JOINT_TORQUES)
+        heard = self.node.subscription(self._heard_by)
         while not stop:
-            is_heard = torques.take() is not None
+            is_heard = heard.take() is not None
             if is_heard:
                 executor.received()
             yield AT_ONCE if is_heard else UNTIL_A_MESSAGE

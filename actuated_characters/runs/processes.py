@@ -12,11 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from actuated_characters.recorder.run_directory import LOGS, PARAMETERS, write_parameters
 from actuated_characters.runs.held_signals import signals_held
 from msgs_config.runtime.extras import require_extra
+
+if TYPE_CHECKING:  # its process is one of these
+    from actuated_characters.runs.foreign_controller import ForeignController
 
 MODULES = {
     "sim_node": "sim_node.main",
@@ -29,6 +32,9 @@ MODULES = {
     "player": "actuated_characters.replay.players.main",
 }
 """The modules that are run by `python -m`, by the names of the nodes, or of several in one."""
+
+FOREIGN = "controller"
+"""The name of a controller that is no `controller_node`."""
 
 _END_TIMEOUT = 10.0  # s that a child has to end after SIGINT, before it is killed
 _LAST_LINES = 3  # are told of a process that failed without saying why
@@ -57,8 +63,8 @@ class Member(Protocol):
     def last_words(self) -> str:
         """The reason for its end."""
 
-    def last_warning(self, since: int) -> str:
-        """The text of its last warning beyond so many bytes of its log; empty: none."""
+    def last_warning(self, since: int, saying: str = "") -> str:
+        """The text of its last warning, which says that, beyond so many bytes of its log."""
 
     def end(self, request: signal.Signals | None = None) -> int:
         """End it, in good order where a signal is given; return the exit code."""
@@ -143,8 +149,8 @@ class Child:
         errors = [line for line in lines if line.startswith("error: ")]
         if errors:
             return errors[-1].removeprefix("error: ")
-        if self.exit_code is None and lines:
-            return lines[-1]
+        if self.exit_code is None:
+            return lines[-1] if lines else "nothing so far"
         printed = [line for line in _filled_lines(self.stdout) if not _PROGRESS.match(line)]
         last = " | ".join((printed + lines)[-_LAST_LINES:])
         if self.exit_code is not None and self.exit_code < 0:
@@ -157,11 +163,14 @@ class Child:
         """Bytes of the log so far."""
         return self._log.stat().st_size
 
-    def last_warning(self, since: int) -> str:
-        """The text of the node's last warning beyond so many bytes of the log; empty: none."""
+    def last_warning(self, since: int, saying: str = "") -> str:
+        """The text of the node's last warning beyond so many bytes of the log; empty: none.
+
+        Of those alone that have the words `saying` in them.
+        """
         later = self._log.read_bytes()[since:].decode(errors="replace")
         found = [match[1] for line in _filled_lines(later) if (match := _WARNING_LINE.match(line))]
-        return found[-1] if found else ""
+        return next((text for text in reversed(found) if saying in text), "")
 
     def send(self, number: signal.Signals) -> None:
         """Send a signal, unless the process has ended."""
@@ -233,6 +242,22 @@ class Children:
         with signals_held():
             self._members.insert(0, make())
         return self._members[0]
+
+    def start_foreign(
+        self, foreign: "ForeignController", session: str, parameters: Mapping[str, object]
+    ) -> Child:
+        """Start anybody's controller; the parameters are those that `controller_node` would have.
+
+        Raises:
+            RunError: there is no such program.
+        """
+        file = write_parameters(self.directory, FOREIGN, parameters, "/**")
+        log = self.directory / LOGS / f"{FOREIGN}.log"
+        environment = os.environ if self._environment is None else self._environment
+        with signals_held():
+            child = foreign.start(log, environment, session, file)
+            self._members.append(child)
+        return child
 
     def start_composed(
         self, name: str, parameters: Mapping[str, Mapping[str, object]], *ros_arguments: str

@@ -84,9 +84,9 @@ class RecorderThread:
         """Why it failed."""
         return str(self._failure)
 
-    def last_warning(self, since: int) -> str:
+    def last_warning(self, since: int, saying: str = "") -> str:
         """None: it waits for nothing."""
-        del since
+        del since, saying
         return ""
 
     def read_lines(self) -> list[str]:

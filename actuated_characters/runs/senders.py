@@ -7,6 +7,7 @@ from actuated_characters.recorder.run_directory import PARAMETERS, read_metrics
 from actuated_characters.runs.planned.files import write_planned
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from msgs_config.errors import RunError
+from msgs_config.messages.topics import JOINT_STATES
 
 
 def plan_senders(
@@ -14,11 +15,18 @@ def plan_senders(
     inputs: PlannedInputs,
     recording: Mapping[str, object],
     fork: Mapping[str, object] | None,
+    *,
+    is_foreign: bool = False,
 ) -> dict[str, dict[str, object]]:
-    """The parameters of the node that sends what was planned, by its name; none if nothing was."""
+    """The parameters of the node that sends what was planned, by its name; none if nothing was.
+
+    A foreign controller may answer at once, so that the simulator is the one that waits for it.
+    """
     if not any(inputs.by_name().values()) and fork is None:
         return {}
     planned = _write_planned(directory, inputs, recording)
+    if is_foreign:
+        planned["heard_by"] = JOINT_STATES.name
     return {"pusher": planned} if fork is None else {"fork": {**planned, **fork}}
 
 

@@ -41,12 +41,18 @@ def read_sweep(path: Path, options: Mapping[str, bool], figures: Sequence[str]) 
         ConfigurationError: something in it is wrong; names the place, and what would be right.
     """
     reader = open_file(path, "a sweep", (*PARTS, "bags"))
+    return sweep_of(reader, options, figures)
+
+
+def sweep_of(reader: MappingReader, options: Mapping[str, bool], figures: Sequence[str]) -> Sweep:
+    """What a file's content says; see `read_sweep`."""
+    reader.check_keys((*PARTS, "bags"))
     bags = reader.choice("bags", BAGS)
     axes = read_axes(reader, options, figures)
-    check_axes(path, axes)
+    check_axes(reader.place, axes)
     if count_rows(axes) > MAX_ROWS:
         raise ConfigurationError(
-            f"{path}: these are {count_rows(axes):,} rows; there may be {MAX_ROWS:,}"
+            f"{reader.place}: these are {count_rows(axes):,} rows; there may be {MAX_ROWS:,}"
         )
     return Sweep(axes, bags, read_seed(reader))
 

@@ -5,7 +5,7 @@ import shutil
 import socket
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -73,8 +73,9 @@ class Outcome:
 
     @property
     def has_failed(self) -> bool:
-        """Whether its character fell, or there was an error."""
-        return bool(self.error) or self.figures.get("fell") is True
+        """Whether its character fell, or did not pass a trial, or there was an error."""
+        fell, survived = self.figures.get("fell"), self.figures.get("survived")
+        return bool(self.error) or fell is True or survived is False
 
 
 @cache
@@ -89,7 +90,12 @@ def row_directory(results: Path, number: int) -> Path:
     return results / ROWS / f"{number:05d}"
 
 
-def compute(task: RowTask, ask: Ask, scratch: Path | None = None) -> Outcome:
+def compute(
+    task: RowTask,
+    ask: Ask,
+    scratch: Path | None = None,
+    run: Callable[[RowTask, Ask, Path], Outcome] | None = None,
+) -> Outcome:
     """Run a row.
 
     The planner of each has one thread, unless the row says otherwise: the workers have the
@@ -99,6 +105,7 @@ def compute(task: RowTask, ask: Ask, scratch: Path | None = None) -> Outcome:
         task: The row.
         ask: Makes its run.
         scratch: Where a folder for its files is made, which is deleted in the end.
+        run: Runs it into a directory; by default in this process.
 
     Raises:
         OSError: the files cannot be written.
@@ -106,7 +113,7 @@ def compute(task: RowTask, ask: Ask, scratch: Path | None = None) -> Outcome:
     """
     with tempfile.TemporaryDirectory(prefix="row-", dir=scratch) as folder:
         directory = Path(folder) / _RUN
-        outcome = _outcome(task, ask, directory)
+        outcome = (run or _outcome)(task, ask, directory)
         if task.bags == "all" or (task.bags == "failures" and outcome.has_failed):
             _keep(directory, row_directory(task.results, task.number))
         return outcome
@@ -123,7 +130,7 @@ def _outcome(task: RowTask, ask: Ask, directory: Path) -> Outcome:
     try:
         asked = ask(with_one_thread(task.arguments))
     except ActuatedCharactersError as error:
-        return Outcome({}, error=" ".join(str(error).split()), is_refused=True)
+        return replace(failed(error, directory), is_refused=True)
     try:
         prepare_directory(directory, overwrite=False)
         run_in_process(
@@ -136,14 +143,18 @@ def _outcome(task: RowTask, ask: Ask, directory: Path) -> Outcome:
     except RecordingError:
         raise  # the disk is full, or the like: not what becomes of the row anywhere
     except ActuatedCharactersError as error:
-        words = " ".join(str(error).split())
-        return Outcome({}, error=words.replace(str(directory), _RUN))  # no path of this worker
+        return failed(error, directory)
     summary, series = read_metrics(directory)
     has_reference = bool(np.isfinite(series["joint_error_mean_rad"]).any())
     verdict = describe_end(
         summary, describe_law(asked.plan.controller), has_reference=has_reference
     )
     return Outcome(_figures(summary), verdict, summary["state_hash"])
+
+
+def failed(error: ActuatedCharactersError, directory: Path) -> Outcome:
+    """The outcome of a row that was refused, or failed; without the path of this worker."""
+    return Outcome({}, error=" ".join(str(error).split()).replace(str(directory), _RUN))
 
 
 def _figures(summary: Mapping[str, Any]) -> dict[str, Cell]:

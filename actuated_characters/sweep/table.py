@@ -18,17 +18,20 @@ _TEXTS = ("fell_in_mode", "verdict", "state_hash", "error")
 Record = dict[str, Cell]
 
 
-def make_records(rows: Sequence[Row], done: Mapping[int, Done]) -> list[Record]:
+def make_records(
+    rows: Sequence[Row], done: Mapping[int, Done], figures: Sequence[str] = FIGURES
+) -> list[Record]:
     """The rows that are done, in their order: what varies, figures, verdict, hash and error."""
-    return [_record(row, done[row.number]) for row in rows if row.number in done]
+    varies = list(dict.fromkeys(name for row in rows for name in row.cells))
+    return [_record(row, done[row.number], varies, figures) for row in rows if row.number in done]
 
 
-def _record(row: Row, done: Done) -> Record:
+def _record(row: Row, done: Done, varies: Sequence[str], figures: Sequence[str]) -> Record:
     outcome = done.outcome
     return {
         "row": row.number,
-        **row.cells,
-        **{name: outcome.figures.get(name) for name in FIGURES},
+        **{name: row.cells.get(name) for name in varies},
+        **{name: outcome.figures.get(name) for name in figures},
         "verdict": outcome.verdict or None,
         "state_hash": outcome.state_hash or None,
         "error": outcome.error or None,

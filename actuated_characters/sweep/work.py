@@ -138,7 +138,9 @@ def work(
         if answer.outcome is None:
             report.undone.append(f"row {number} could not be done: {answer.failure}")
         elif answer.is_repeat:
-            journal.add_verified(_compared(journal.done[number], answer.outcome, answer.by))
+            journal.add_verified(
+                compared(journal.done[number], Done(number, answer.outcome, answer.by))
+            )
         else:
             journal.add(Done(number, answer.outcome, answer.by))
             if number in to_verify:
@@ -161,17 +163,16 @@ def _tasks(job: Job, journal: Journal, to_verify: frozenset[int]) -> Iterator[tu
             yield job.task(row, is_repeat=True), True
 
 
-def _compared(done: Done, outcome: Outcome, by: str) -> Verified:
-    """Whether a row's second outcome is its first one."""
-    first, second = _flat(done.outcome), _flat(outcome)
+def compared(done: Done, again: Done) -> Verified:
+    """Whether a row's second outcome is its first one; names the first thing that is not."""
+    first, second = _flat(done.outcome), _flat(again.outcome)
     names = [name for name in first | second if first.get(name) != second.get(name)]
     if not names:
-        return Verified(done.number, "", by)
+        return Verified(done.number, "", again.by)
     # the hash says it best: figures are rounded, and an error comes with none at all
     name = "state_hash" if "state_hash" in names else names[0]
-    return Verified(
-        done.number, f"{name} is {first.get(name)!r} by {done.by}, {second.get(name)!r} by {by}", by
-    )
+    difference = f"{name} is {first.get(name)!r} by {done.by}, {second.get(name)!r} by {again.by}"
+    return Verified(done.number, difference, again.by)
 
 
 def _flat(outcome: Outcome) -> dict[str, str]:

@@ -26,6 +26,11 @@ def hint(extra: str) -> str:
     )
 
 
+def is_installed(extra: str) -> bool:
+    """Whether all packages of an extra are there."""
+    return all(find_spec(package) is not None for package in PACKAGES[extra])
+
+
 def require_extra(
     extra: str, what: str, error: type[ActuatedCharactersError] = ConfigurationError
 ) -> None:

@@ -4,10 +4,13 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
+
+_PATIENCE = 20.0  # s that a process has which puts things away when it is to end
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -98,4 +101,6 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)  # ends it at once, unless it has something to put away
+        time.sleep(_PATIENCE)
         os._exit(1)

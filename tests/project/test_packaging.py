@@ -62,7 +62,9 @@ def test_executables_lie_where_ros2_run_looks_for_them(prefix: Path) -> None:
     assert not (prefix / "bin").exists()
 
 
-@pytest.mark.parametrize("folder", ["launch", "config", "examples", "examples/without_rclpy"])
+@pytest.mark.parametrize(
+    "folder", ["launch", "config", "examples", "examples/trials", "examples/without_rclpy"]
+)
 def test_what_users_read_and_launch_is_shared(prefix: Path, folder: str) -> None:
     shipped = {path.name for path in (PROJECT / folder).iterdir() if path.is_file()}
 

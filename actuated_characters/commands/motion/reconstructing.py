@@ -16,7 +16,7 @@ from actuated_characters.commands.common.settings import (
 from actuated_characters.commands.common.skin_options import given_skin
 from actuated_characters.commands.view import add_server, server_parameters
 from msgs_config.errors import ConfigurationError
-from msgs_config.runtime.extras import hint, require_extra
+from msgs_config.runtime.extras import hint, is_installed, require_extra
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.reconstruction.reconstruction import Job
@@ -116,12 +116,12 @@ def _job(options: argparse.Namespace) -> "Job":
     from actuated_characters.reconstruction.problem import Problem, duration_of
     from actuated_characters.reconstruction.reconstruction import Job
     from actuated_characters.reconstruction.search import SearchSettings
-    from actuated_characters.reconstruction.workers import has_dask, usual_count
+    from actuated_characters.reconstruction.workers import usual_count
 
     if options.scheduler is not None:
         require_extra("sweep", "--scheduler")
     workers = usual_count() if options.workers is None else options.workers
-    if options.workers is None and not has_dask():
+    if options.workers is None and not is_installed("sweep"):
         print(f"on one processor; for all of them: {hint('sweep')}")
     if workers < 1:
         raise ConfigurationError(f"--workers is {workers}; it must be 1 or more")
