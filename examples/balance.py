@@ -110,7 +110,8 @@ class BalanceController(Node):
     def balance(self, imu, left, right, passed):
         """Torques on the body about y (left) and x (forward), N m; `passed` s since the last."""
         x, y, z, w = (getattr(imu.orientation, axis) for axis in "xyzw")
-        forward, sideways = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x)  # of the pelvis' z axis
+        # where the pelvis' z axis leans to, seen from the pelvis, whichever way that looks
+        forward, sideways = 2.0 * (w * y - x * z), -2.0 * (w * x + y * z)
         load = left.force.z + right.force.z
         if load > LEAST_LOAD:
             pressure = -(left.torque.y + right.torque.y) / load  # m in front of the soles' middle

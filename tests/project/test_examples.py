@@ -240,20 +240,27 @@ def centre_of_mass(state: JointState) -> tuple[FloatArray, FloatArray]:
     return weighted / humanoid.mass, linear / humanoid.mass
 
 
-@pytest.mark.parametrize("pushed", [1, pytest.param(3, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(
+    ("pushed", "heading"), [(1, 2.6), pytest.param(3, 0.0, marks=pytest.mark.nightly)]
+)
 def test_the_humanoid_balances_by_its_sensors_and_bears_pushes(
-    processes: Processes, client: SimulatorClient, pushed: int
+    processes: Processes, client: SimulatorClient, pushed: int, heading: float
 ) -> None:
-    # Arrange: a push of 7 N s forward, one to the left and one backward
+    # Arrange: a push of 7 N s forward, one to the left and one backward, whichever way it looks
     imu = client.listen(topics.sensor_reading(SensorType.IMU, "imu/pelvis_imu"))
     rate, period = 1000, 4 if pushed > 1 else 1
     seconds = period * pushed + 6 if pushed > 1 else 6
     simulator = processes.simulator(
-        "humanoid", rate=rate, max_ticks=rate * seconds, wait_for_subscribers=2
+        "humanoid",
+        rate=rate,
+        max_ticks=rate * seconds,
+        wait_for_subscribers=2,
+        placement=[0.0, 0.0, 0.0, heading],
     )
     client.spin_until(client.wrenches.get_subscription_count, "a simulator that listens")
-    forces = ([70.0, 0.0, 0.0], [0.0, 70.0, 0.0], [-70.0, 0.0, 0.0])
-    for number, force in enumerate(forces[:pushed]):
+    for number in range(pushed):
+        way = heading + number * math.pi / 2.0
+        force = [70.0 * math.cos(way), 70.0 * math.sin(way), 0.0]
         stamp = TickClock(rate).stamp_ns(rate * period * (number + 1))
         client.wrenches.publish(wrench_message(stamp, [("chest", [*force, 0.0, 0.0, 0.0])]))
 

@@ -131,7 +131,7 @@ def test_all_rows_are_the_same_once_more(together: Processes, result: Path) -> N
     again = Run(together, "verify", str(result), "--workers", "2").finish()
 
     assert "4 of 4 rows were run again, 0 differ" in again.process.stdout
-    assert again.family == {}
+    wait_until(lambda: not again.family, "the end of all its processes")
 
 
 def test_a_row_that_is_not_the_same_is_named_with_both_hosts(
@@ -174,7 +174,7 @@ def test_a_controller_that_ends_early_is_a_row_with_its_last_words(
 
     assert error == "controller failed: my law is undefined here"
     assert f"error: {error}" in run.process.stderr
-    assert run.family == {}  # the other process that it has started has ended as well
+    wait_until(lambda: not run.family, "the end of the other process that it has started")
     assert "1 │        0 │      1" in run.process.stdout
     assert (tmp_path / "result" / "rows" / "00001" / "logs" / "controller.log").is_file()
 
@@ -187,7 +187,7 @@ def test_a_controller_that_never_answers_is_one_as_well(
     run, error = trial_of(together, tmp_path, text)
 
     assert error.startswith("no answer within 6 s; sim_node says: ")
-    assert run.family == {}
+    wait_until(lambda: not run.family, "the end of all its processes")
 
 
 def test_of_an_answer_that_is_none_it_is_told_what_the_simulator_said(
