@@ -85,11 +85,16 @@ def result(together: Processes, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return folder / "result"
 
 
-def simulated(start: float) -> str:
-    """The hash of what the example's law does, in a simulation without any process or topic."""
+def simulated(start: float, force: float = 0.0, pushed_at: int = TICKS) -> str:
+    """The hash of what the example's law does, in a simulation without any process or topic.
+
+    The rod is pushed along x by a force in N from a tick on.
+    """
     begin = StampedState(0, np.array([start]), np.zeros(1), None)
     with ac.Simulation(ac.load_character("pendulum"), begin) as simulation:
-        for _ in range(TICKS):
+        for tick in range(TICKS):
+            if tick == pushed_at:
+                simulation.push("rod", (force, 0.0, 0.0))
             (q,), (v,) = simulation.state.position, simulation.state.velocity
             weight = 1.0 * 9.81 * 0.5 * math.sin(q)
             simulation.step(np.array([50.0 * (1.0 - q) - 5.0 * v + weight]))
@@ -100,8 +105,12 @@ def test_each_row_has_the_states_of_the_controller_s_law_to_the_last_bit(result:
     done = read_done(result)
 
     assert sorted(done) == [1, 2, 3, 4]
-    assert [done[row].outcome.state_hash for row in (1, 2)] == [simulated(0.5), simulated(1.5)]
-    assert len({each.outcome.state_hash for each in done.values()}) == 4
+    assert [done[row].outcome.state_hash for row in sorted(done)] == [
+        simulated(0.5),
+        simulated(1.5),
+        simulated(0.5, 20.0, 24),  # 0.1 s at 240 Hz
+        simulated(0.5, 90.0, 96),
+    ]
 
 
 def test_a_row_is_judged_by_where_the_pendulum_is(result: Path) -> None:
