@@ -17,7 +17,17 @@ from tests.documented.promise import Promise
 
 _LONGEST = 7200.0  # s
 _PATIENCE = 60.0  # s that a command may take to end after Ctrl-C, or to show its page
-_LEFT_OUT = {".git", "runs", "studies", "sweeps", "trials", "build", "recording", "reconstructions"}
+_LEFT_OUT = {
+    ".git",
+    "runs",
+    "studies",
+    "sweeps",
+    "searches",
+    "trials",
+    "build",
+    "recording",
+    "reconstructions",
+}
 _ADDRESS = re.compile(r"https?://[\w.\[\]:]+(?:/\S*)?")
 _INTERRUPTED = (0, 130, -signal.SIGINT)
 
