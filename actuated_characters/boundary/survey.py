@@ -44,16 +44,22 @@ class Survey:
         self.search = search
         self.points = [Point(number, cells) for number, cells in search.points()]
         self.rows: list[Row] = []
+        self._pending: list[Row] = []  # of the round that is not over
 
-    def next_round(self, done: Mapping[int, Done]) -> list[Row]:
-        """Take what has become of the last round's runs, and plan the next one's."""
-        way = self.search.way
-        for point in self.points:
-            self._learn(point, done)
+    def advance(self, done: Mapping[int, Done]) -> list[Row]:
+        """The runs that are next, some of which are not done; none when there are no more."""
+        while all(row.number in done for row in self._pending):
+            for point in self.points:
+                self._learn(point, done)
+            self._pending = self._next_round()
+            if not self._pending:
+                break
+        return self._pending
+
+    def _next_round(self) -> list[Row]:
         before = len(self.rows)
         for point in self.points:
-            values = [] if point.error else values_to_try(way, point.tried)
-            for value in values:
+            for value in [] if point.error else values_to_try(self.search.way, point.tried):
                 row = self.search.row(point.number, value, len(self.rows) + 1)
                 point.rows[value] = row
                 self.rows.append(row)
@@ -95,9 +101,16 @@ def survey(
     Raises:
         RunError: no more answers will come, or the journal cannot be written.
     """
-    while rows := found.next_round(journal.done):
+    while rows := found.advance(journal.done):
         report = work(Job(rows, directory), workers, journal, progress)
         if report.undone:
             return report  # the numbers of all later runs depend on it
     kept = Job(found.ends(), directory, bags="all", verified=1.0, keeps_repeats=True)
     return work(kept, workers, journal, progress)
+
+
+def is_over(found: Survey, journal: Journal) -> bool:
+    """Whether there is nothing left to do."""
+    return not found.advance(journal.done) and all(
+        row.number in journal.verified for row in found.ends()
+    )

@@ -87,8 +87,11 @@ def _work(
     options: argparse.Namespace, found: "Survey", directory: Path, journal: "Journal"
 ) -> "Report":
     """Have the runs done; shows the progress."""
-    from actuated_characters.boundary.survey import survey
+    from actuated_characters.boundary.survey import is_over, survey
+    from actuated_characters.sweep.work import Report
 
+    if is_over(found, journal):
+        return Report()
     with (
         row_workers(options, directory) as workers,
         progress_bar(options.file.stem, found.most_rows(), "runs") as bar,

@@ -32,9 +32,7 @@ from msgs_config.shared_parameters import KEYFRAME_BUDGET, KEYFRAME_PERIOD, RESU
 
 _LOOK_TICKS = 24  # between looks at whether it has fallen
 _KEYFRAMES = {KEYFRAME_PERIOD.name: 0.25, KEYFRAME_BUDGET.name: 5_000}  # s; kB/s
-_SUBSCRIBERS = (
-    3  # of states and torques: the other node, the one that sends, and the one that looks
-)
+_SUBSCRIBERS = 3  # of states and torques: the other node, who sends, and who looks
 _KEYFRAME = topics.KEYFRAME.of(topics.SIM_NODE)
 _CONTROLLER_KEYFRAME = topics.CONTROLLER_KEYFRAME.of(topics.CONTROLLER_NODE)
 

@@ -29,9 +29,7 @@ class Goal:
 
     posture: str = POSTURES[0]  # it must not fall from this one, where its base floats
     joint_error: float | None = None  # rad, the largest mean distance from the run's reference
-    travels: tuple[float, float] | None = (
-        None  # m along the ground, from the first place to the last
-    )
+    travels: tuple[float, float] | None = None  # m along the ground, from start to end
     at_end: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Least and largest position in the last state, rad or m, by the degree of freedom."""
 

@@ -9,7 +9,7 @@ import pytest
 
 from actuated_characters.boundary.file import read_search
 from actuated_characters.boundary.picture import PICTURE, draw
-from actuated_characters.boundary.survey import Survey, survey
+from actuated_characters.boundary.survey import Survey, is_over, survey
 from actuated_characters.boundary.table import boundary_records
 from actuated_characters.sweep.grid import Cell
 from actuated_characters.sweep.journal import Done, Journal
@@ -110,12 +110,15 @@ def test_the_runs_at_the_boundary_are_made_once_more_with_their_bags(tmp_path: P
 def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path, most: int) -> None:
     whole, _ = searched(tmp_path, Here(1), "whole")
     with Journal(tmp_path / "cut", {}) as journal, pytest.raises(RunError):
+        assert not is_over(started(tmp_path), journal)
         survey(started(tmp_path), tmp_path / "cut", Here(4, most), journal)
     workers = Here(5)
 
     again, _ = searched(tmp_path, workers, "cut")
 
     assert again.rows == whole.rows
+    with Journal(tmp_path / "cut", {}) as journal:
+        assert is_over(started(tmp_path), journal)
     assert len(workers.asked) == len(whole.rows) + len(whole.points) - most
 
 
