@@ -35,7 +35,7 @@ from actuated_characters.shrink.shrinking import (
 from actuated_characters.shrink.trial import script_of
 from benchmarks.support.machine import describe_machine
 from benchmarks.support.printed import make_table
-from msgs_config.errors import ActuatedCharactersError
+from msgs_config.errors import ActuatedCharactersError, SimulationError
 from msgs_config.messages.clock import FIRST_TICK, TickClock
 
 _DURATION = 4.0  # s
@@ -82,7 +82,10 @@ def _draw_failure(base: Path, plan: RunPlan, rng: np.random.Generator, directory
             continue
         fork = plan_fork(base, 0.0, ForkInputs({}, with_later=False))
         prepare_directory(directory, overwrite=True)
-        run_fork(fork, directory, script=script_of(fork.recording, events, compared=0))
+        try:
+            run_fork(fork, directory, script=script_of(fork.recording, events, compared=0))
+        except SimulationError:  # it diverged, which is no fall
+            continue
         if read_metrics(directory)[0]["fell"]:
             return
 
