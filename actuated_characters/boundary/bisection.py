@@ -44,7 +44,8 @@ def values_to_try(way: Way, tried: Tried) -> list[Value]:
         return []
     if abs(boundary.fails - boundary.holds) <= way.within:
         return []
-    return [_between(boundary.holds, boundary.fails, way.whole)]
+    middle = _between(boundary.holds, boundary.fails, way.whole)
+    return [] if middle in tried else [middle]  # there may be no number between
 
 
 def find_boundary(way: Way, tried: Tried) -> Boundary:

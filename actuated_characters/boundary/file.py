@@ -12,7 +12,6 @@ from actuated_characters.sweep.axes import (
     check_parameter,
     check_value_name,
     read_axes,
-    read_seed,
 )
 from actuated_characters.sweep.file import PARTS, open_file
 from actuated_characters.sweep.grid import Axis, Cell, Choice, Row, cell_text, count_rows, expand
@@ -21,9 +20,11 @@ from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.mappings import MappingReader
 
 FELL = "fell"
+BAGS = ["all", "none"]
 _KEYS = ("value", "from", "to", "within", "steps", "fails", "around")
 _OWN_COLUMNS = (*OWN_COLUMNS, "point", "holds", "fails", "holes", "tries")
 _DEFAULT_STEPS, _MOST_STEPS = 8, 1000
+_NO_NUMBERS = (FELL, "fell_in_mode")
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Search:
     figure: str  # fails if this is true, or above the limit
     limit: float
     around: str  # the column that is an angle in degrees; empty: none
-    seed: int
+    bags: str  # of BAGS: whether the run at each point's boundary is kept
 
     def points(self) -> list[tuple[int, Mapping[str, Cell]]]:
         """All points by their numbers, from 1 on, with what the table says of each."""
@@ -53,16 +54,19 @@ class Search:
         (row,) = expand(axes)
         return replace(row, number=number)
 
-    def has_failed(self, outcome: Outcome) -> bool:
-        """Whether a run that began has failed: one that could not go on has, such as one that
-        diverged.
+    def has_failed(self, outcome: Outcome) -> bool | None:
+        """Whether a run has failed; None if it was refused, or has not the figure that says so.
+
+        One that could not go on has failed, such as one that diverged.
         """
+        if outcome.is_refused:
+            return None
         figure = outcome.figures.get(self.figure)
         if outcome.error:
             return True
         if self.figure == FELL:
-            return figure is True
-        return isinstance(figure, (int, float)) and figure > self.limit
+            return None if figure is None else figure is True
+        return figure > self.limit if isinstance(figure, (int, float)) else None
 
     def describe_failure(self) -> str:
         """What counts as a failure, in a few words."""
@@ -91,7 +95,7 @@ def read_search(path: Path, options: Mapping[str, bool], figures: Sequence[str])
     Raises:
         ConfigurationError: something in it is wrong; names the place, and what would be right.
     """
-    reader = open_file(path, "a search", (*PARTS, "search"))
+    reader = open_file(path, "a search", (*PARTS, "bags", "search"))
     axes = read_axes(reader, options, [*figures, *_OWN_COLUMNS])
     part = reader.part("search")
     part.check_keys(_KEYS)
@@ -102,7 +106,8 @@ def read_search(path: Path, options: Mapping[str, bool], figures: Sequence[str])
         raise ConfigurationError(
             f"{path}: these are {count_rows(axes):,} points; there may be {MAX_ROWS:,}"
         )
-    return Search(axes, value, way, figure, limit, _read_angle(part, axes), read_seed(reader))
+    bags = reader.choice("bags", BAGS)
+    return Search(axes, value, way, figure, limit, _read_angle(part, axes), bags)
 
 
 def _choice(name: str, value: Value) -> Choice:
@@ -147,8 +152,8 @@ def _read_failure(reader: MappingReader, figures: Sequence[str]) -> tuple[str, f
             "fails", given, f"'{FELL}', or a figure and its limit: {{root_error_max_m: 0.5}}"
         )
     (figure,) = part.content
-    if figure not in figures or figure == FELL:
-        known = [each for each in figures if each != FELL]
+    known = [each for each in figures if each not in _NO_NUMBERS]
+    if figure not in known:
         sentence = one_of("figure", figure, known, part.prefix)
         raise ConfigurationError(f"{reader.place}: {sentence}")
     return figure, part.number(figure)

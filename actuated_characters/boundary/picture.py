@@ -30,6 +30,7 @@ def draw(found: Survey, file: Path) -> bool:
     points = [point for point in found.points if point.tried and not point.error]
     columns = [name for name in (points[0].cells if points else ()) if _varies(name, points)]
     if not columns:
+        file.unlink(missing_ok=True)  # it would be of an earlier search
         return False
     around = found.search.around
     along = around if around in columns else columns[-1]
@@ -37,15 +38,15 @@ def draw(found: Survey, file: Path) -> bool:
     width = min(len(panels), _PANELS_IN_ROW)
     height = math.ceil(len(panels) / width)
     size = (max(width, 2) * _PANEL, height * _PANEL + 0.5)
-    figure, reach = Figure(figsize=size, layout="constrained"), _reach(found, points)
+    figure, limits = Figure(figsize=size, layout="constrained"), _limits(found, points)
     for place, (title, inside) in enumerate(panels, start=1):
         if along == around:
             axes: Axes = figure.add_subplot(height, width, place, projection="polar")
-            _draw_around(axes, found, inside, reach)
+            _draw_around(axes, found, inside, limits)
         else:
             axes = figure.add_subplot(height, width, place)
             _draw_along(axes, found, inside, along)
-            axes.set_ylim(min(found.search.way.first, found.search.way.last), reach)
+            axes.set_ylim(*limits)
         axes.set_title(title, fontsize="medium")
     figure.suptitle(_title(found), fontsize="medium")
     labels = {
@@ -77,32 +78,37 @@ def _panels(points: Sequence[Point], columns: Sequence[str]) -> list[tuple[str, 
     return list(panels.items())
 
 
-def _draw_around(axes: Axes, found: Survey, points: Sequence[Point], reach: float) -> None:
-    """Bars around the character, which faces upwards; the angle is that of where a push is from."""
+def _draw_around(
+    axes: Axes, found: Survey, points: Sequence[Point], limits: tuple[float, float]
+) -> None:
+    """Bars around the character, which faces upwards; the angle is that of where a push is from.
+
+    Each goes from where the search begins to where runs hold, inwards if the search leads down.
+    """
     assert isinstance(axes, PolarAxes)
-    way = found.search.way
-    inner = min(way.first, way.last)
+    begin = float(found.search.way.first)
     angles = [math.radians(float(point.cells[found.search.around] or 0)) for point in points]
     axes.set_theta_zero_location("N")
-    axes.set_ylim(inner, reach)
+    axes.set_ylim(*limits)
     axes.tick_params(labelsize="x-small")
     for colour, label, are_open in ((_HOLDS, "holds", False), (_ALL_HOLD, "nothing failed", True)):
         for angle, point in zip(angles, points, strict=True):
             boundary = found.boundary(point)
             if boundary.holds is None or (boundary.fails is None) != are_open:
                 continue
-            length, width = boundary.holds - inner, 0.9 * math.tau / len(points)
-            axes.bar(angle, length, width, inner, color=colour, alpha=0.6, label=label)
+            length, width = boundary.holds - begin, 0.9 * math.tau / len(points)
+            axes.bar(angle, length, width, begin, color=colour, alpha=0.6, label=label)
     _draw_holes(axes, found, angles, points)
 
 
-def _reach(found: Survey, points: Sequence[Point]) -> float:
-    """Up to which value there is something to be seen."""
+def _limits(found: Survey, points: Sequence[Point]) -> tuple[float, float]:
+    """The values between which there is something to be seen, the less one first."""
     way, boundaries = found.search.way, [found.boundary(point) for point in points]
-    if way.last < way.first or any(each.fails is None for each in boundaries):
-        return float(max(way.first, way.last))
     ends = [value for each in boundaries for value in (each.fails, *each.holes)]
-    return 1.1 * max(float(value) for value in ends if value is not None)
+    known = [float(way.last) if value is None else float(value) for value in ends]
+    margin = 0.05 * (way.last - way.first)
+    furthest = (min if way.last < way.first else max)(known, default=float(way.last)) + margin
+    return min(furthest, float(way.first)), max(furthest, float(way.first))
 
 
 def _draw_along(axes: Axes, found: Survey, points: Sequence[Point], name: str) -> None:

@@ -18,7 +18,7 @@ from actuated_characters.boundary.bisection import (
 from actuated_characters.boundary.file import Search
 from actuated_characters.sweep.grid import Cell, Row
 from actuated_characters.sweep.journal import Done, Journal
-from actuated_characters.sweep.work import Job, Report, Workers, work
+from actuated_characters.sweep.work import Job, Report, Workers, is_done, work
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Point:
     cells: Mapping[str, Cell]
     rows: dict[Value, Row] = field(default_factory=dict)  # those that were run, by value
     tried: dict[Value, bool] = field(default_factory=dict)
-    error: str = ""  # why one of its runs was refused, after which there are no more
+    error: str = ""  # why one of its runs says nothing, after which there are no more
 
     def end(self, boundary: Boundary) -> Row:
         """The run that shows where the way ends: the first that fails, or else the last one."""
@@ -84,9 +84,11 @@ class Survey:
     def _learn(self, point: Point, done: Mapping[int, Done]) -> None:
         for value, row in point.rows.items():
             outcome = done[row.number].outcome
-            if outcome.is_refused and not point.error:
-                point.error = f"row {row.number}: {outcome.error}"
-            point.tried[value] = self.search.has_failed(outcome)
+            failed = self.search.has_failed(outcome)
+            if failed is None:
+                why = outcome.error or f"it has no figure '{self.search.figure}'"
+                point.error = point.error or f"row {row.number}: {why}"
+            point.tried[value] = failed is True
 
 
 def survey(
@@ -96,7 +98,7 @@ def survey(
     journal: Journal,
     progress: Callable[[], object] = lambda: None,
 ) -> Report:
-    """Have all runs of a search done, and those at the boundaries once more, with their bags.
+    """Have all runs of a search done.
 
     Raises:
         RunError: no more answers will come, or the journal cannot be written.
@@ -105,12 +107,23 @@ def survey(
         report = work(Job(rows, directory), workers, journal, progress)
         if report.undone:
             return report  # the numbers of all later runs depend on it
-    kept = Job(found.ends(), directory, bags="all", verified=1.0, keeps_repeats=True)
-    return work(kept, workers, journal, progress)
+    return Report()
 
 
-def is_over(found: Survey, journal: Journal) -> bool:
+def keep_ends(found: Survey, directory: Path, workers: Workers, journal: Journal) -> Report:
+    """Have those at the boundaries done once more, and their bags kept, if the search asks for it.
+
+    Raises:
+        RunError: as `survey`, or a bag cannot be written.
+    """
+    return work(_to_keep(found, directory), workers, journal)
+
+
+def is_over(found: Survey, directory: Path, journal: Journal) -> bool:
     """Whether there is nothing left to do."""
-    return not found.advance(journal.done) and all(
-        row.number in journal.verified for row in found.ends()
-    )
+    return not found.advance(journal.done) and is_done(_to_keep(found, directory), journal)
+
+
+def _to_keep(found: Survey, directory: Path) -> Job:
+    rows = found.ends() if found.search.bags == "all" else []
+    return Job(rows, directory, bags="all", verified=1.0, keeps_repeats=True)

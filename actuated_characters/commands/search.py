@@ -52,28 +52,35 @@ def add_search(commands: "Commands[argparse.ArgumentParser]") -> None:
 def _search(options: argparse.Namespace) -> int:
     require_extra("sweep", "search")
     from actuated_characters.boundary.file import read_search
+    from actuated_characters.boundary.picture import PICTURE
     from actuated_characters.boundary.survey import Survey
+    from actuated_characters.boundary.table import BOUNDARY
     from actuated_characters.commands.common.row_runs import asked_run, row_options
+    from actuated_characters.sweep.grid import rows_to_check
     from actuated_characters.sweep.journal import Journal, fingerprint
     from actuated_characters.sweep.row import FIGURES, ROWS, engine_versions
+    from actuated_characters.sweep.table import PARQUET, TABLE
     from actuated_characters.sweep.work import check_rows
 
     check_row_workers(options)
     search = read_search(options.file, row_options(), FIGURES)
     found = Survey(search)
     ends = [
-        search.row(point.number, value, point.number)
-        for point in found.points
+        [search.row(point.number, value, point.number) for point in found.points]
         for value in (search.way.first, search.way.last)
     ]
-    for warning in check_rows(options.file, asked_run, ends[: 2 * _MOST_CHECKED]):
+    to_check = [row for rows in ends for row in rows_to_check(search.axes, rows, _MOST_CHECKED)]
+    for warning in check_rows(options.file, asked_run, to_check):
         print(warning)
     directory = results_directory(options, _FOLDER)
     check_interruption()  # all modules are imported by now
-    made_of = fingerprint(ends, engine_versions(), search.way, search.figure, search.limit)
+    rows = [row for each in ends for row in each]
+    made_of = fingerprint(rows, engine_versions(), search.way, search.figure, search.limit)
     with Journal(directory, made_of, again=options.again) as journal:
         if journal.has_forgotten:
             shutil.rmtree(directory / ROWS, ignore_errors=True)
+            for name in (BOUNDARY, PICTURE, TABLE, PARQUET):
+                (directory / name).unlink(missing_ok=True)
         try:
             report = _work(options, found, directory, journal)
         except BaseException:
@@ -87,10 +94,11 @@ def _work(
     options: argparse.Namespace, found: "Survey", directory: Path, journal: "Journal"
 ) -> "Report":
     """Have the runs done; shows the progress."""
-    from actuated_characters.boundary.survey import is_over, survey
+    from actuated_characters.boundary.survey import is_over, keep_ends, survey
     from actuated_characters.sweep.work import Report
 
-    if is_over(found, journal):
+    if is_over(found, directory, journal):
+        _write(found, directory, journal)
         return Report()
     with (
         row_workers(options, directory) as workers,
@@ -102,28 +110,38 @@ def _work(
 
         progress()
         report = survey(found, directory, workers, journal, progress)
-        bar.update(bar.task_ids[0], total=len(journal.done))  # it may have been fewer
-        return report
+        bar.update(bar.task_ids[0], total=len(journal.done), state="")  # it may have been fewer
+        _write(found, directory, journal)  # what was found is there if bags cannot be kept
+        return report if report.undone else keep_ends(found, directory, workers, journal)
 
 
-def _conclude(found: "Survey", directory: Path, journal: "Journal", report: "Report") -> int:
-    """Write tables and picture, and say what was found; returns the exit code."""
+def _write(found: "Survey", directory: Path, journal: "Journal") -> None:
+    """Write the tables, and the picture if there is anything to be seen."""
     from actuated_characters.boundary.picture import PICTURE, draw
-    from actuated_characters.boundary.table import BOUNDARY, boundary_records, write_boundary
+    from actuated_characters.boundary.table import write_boundary
     from actuated_characters.sweep.table import make_records, write_tables
 
     write_tables(directory, make_records(found.rows, journal.done))
+    write_boundary(directory, found, journal.done)
+    draw(found, directory / PICTURE)
+
+
+def _conclude(found: "Survey", directory: Path, journal: "Journal", report: "Report") -> int:
+    """Say what was found; returns the exit code."""
+    from actuated_characters.boundary.picture import PICTURE
+    from actuated_characters.boundary.table import BOUNDARY, boundary_records
+
     errors = list(report.undone)
-    if not report.undone:
-        records = boundary_records(found, journal.done)
-        write_boundary(directory, found, journal.done)
-        if len(records) <= _MOST_SHOWN:
-            _print_points(records)
-        _print_summary(found)
-        print(f"the table: {directory / BOUNDARY}; a bag of each point: {directory / 'rows'}")
-        if draw(found, directory / PICTURE):
-            print(f"the picture: {directory / PICTURE}")
-        errors += [f"point {each.number}: {each.error}" for each in found.points if each.error]
+    records = boundary_records(found, journal.done)
+    if records and len(records) <= _MOST_SHOWN:
+        _print_points(records)
+    _print_summary(found)
+    print(f"the table: {directory / BOUNDARY}")
+    if (directory / PICTURE).exists():
+        print(f"the picture: {directory / PICTURE}")
+    if found.search.bags == "all" and not report.undone:
+        print(f"a bag of each point: {directory / 'rows'}")
+    errors += [f"point {each.number}: {each.error}" for each in found.points if each.error]
     different = [each for each in journal.verified.values() if each.difference]
     errors += [f"row {each.number} differs: {each.difference}" for each in different]
     for line in errors:

@@ -66,7 +66,7 @@ class Journal:
             directory.mkdir(parents=True, exist_ok=True)
             self._lock = DirectoryLock(directory)
         except BlockingIOError as error:
-            raise RunError(f"another sweep writes to {directory}; wait for its end") from error
+            raise RunError(f"another command writes to {directory}; wait for its end") from error
         except OSError as error:
             raise RunError(f"cannot write to {directory}: {error.strerror or error}") from error
         try:
@@ -99,7 +99,7 @@ class Journal:
             for record in records:
                 self._take(record)
         except (ValueError, TypeError, KeyError) as error:
-            raise RunError(f"{path}: no journal of a sweep; --again begins a new one") from error
+            raise RunError(f"{path}: no journal of runs; --again begins a new one") from error
 
     def _take(self, record: Mapping[str, Any]) -> None:
         if "verified" in record:
@@ -157,7 +157,7 @@ def _mismatch(path: Path, found: object, wanted: Mapping[str, object]) -> str:
         changes = (f"{name} {found.get(name)} (now {wanted[name]})" for name in others)
         what = f"was made with {', '.join(changes)}"
     else:
-        what = "is of another sweep, or a file that it names has changed"
+        what = "is of another file, or a file that it names has changed"
     return f"{path} {what}; choose another --output, or --again, which deletes it"
 
 

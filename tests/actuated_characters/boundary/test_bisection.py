@@ -1,5 +1,6 @@
 """Which values a search tries, and what it says of them, by runs whose failures are known."""
 
+import math
 from collections.abc import Callable
 
 import pytest
@@ -70,6 +71,15 @@ def test_a_failure_that_bisection_meets_before_is_the_boundary() -> None:
 
     assert find_boundary(way, tried) == Boundary(7, 8, ())  # 3 was never tried
     assert 3 not in tried
+
+
+def test_nothing_is_tried_twice_where_there_is_no_number_between() -> None:
+    way = Way(1.0, 2.0, 1e-17, 4)
+    tried = searched(way, lambda value: value >= 1.3)
+    found = find_boundary(way, tried)
+
+    assert found.holds is not None
+    assert found.fails == math.nextafter(found.holds, 2.0) == 1.3
 
 
 @pytest.mark.parametrize(

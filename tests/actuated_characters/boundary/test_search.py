@@ -64,3 +64,15 @@ def test_the_blow_that_lowers_a_mass_too_far_is_that_of_theory(tmp_path: Path) -
     again = search(tmp_path, "--workers", "1")
     assert again.returncode == 0
     assert again.stdout == done.stdout
+
+
+def test_a_search_is_not_taken_for_another_one(tmp_path: Path) -> None:
+    (tmp_path / "lift.yaml").write_text(FILE.replace("to: 6.0", "to: 0.1"))
+    assert search(tmp_path, "--workers", "1").returncode == 0
+    (tmp_path / "lift.yaml").write_text(FILE.replace("to: 6.0", "to: 0.1").replace("0.2}", "0.3}"))
+
+    other = search(tmp_path, "--workers", "1")
+
+    assert other.returncode == 1
+    assert f"{tmp_path / 'out' / 'rows.jsonl'} is of another " in other.stderr
+    assert search(tmp_path, "--workers", "1", "--again").returncode == 0

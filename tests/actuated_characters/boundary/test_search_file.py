@@ -64,8 +64,11 @@ def test_a_run_fails_by_its_fall_or_by_a_figure_above_its_limit(tmp_path: Path) 
     assert by_fall.has_failed(Outcome({"fell": True, "root_error_max_m": 0.1}))
     assert not by_fall.has_failed(Outcome({"fell": False, "root_error_max_m": 9.0}))
     assert by_figure.has_failed(Outcome({"fell": False, "root_error_max_m": 1.1}))
-    assert not by_figure.has_failed(Outcome({"fell": True, "root_error_max_m": 1.0}))
-    assert not by_figure.has_failed(Outcome({"fell": True, "root_error_max_m": None}))
+    assert by_figure.has_failed(Outcome({"fell": True, "root_error_max_m": 1.0})) is False
+    assert by_figure.has_failed(Outcome({"fell": True, "root_error_max_m": None})) is None
+    assert by_fall.has_failed(Outcome({"fell": None})) is None
+    assert by_fall.has_failed(Outcome({}, error="it diverged"))
+    assert by_fall.has_failed(Outcome({}, error="no such clip", is_refused=True)) is None
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,12 @@ def test_a_run_fails_by_its_fall_or_by_a_figure_above_its_limit(tmp_path: Path) 
         ("around: side", "around: way", "unknown column 'search.way'"),
         ("from: 0, ", "", "search.from is None; it must be a finite number"),
         ("search: {", "look: {", "unknown key 'look'"),
-        ("values: {", "bags: all\nvalues: {", "unknown key 'bags'"),
+        ("values: {", "bags: failures\nvalues: {", "bags is 'failures'; it must be 'all' or"),
+        (
+            "within: 1",
+            "within: 1, fails: {fell_in_mode: 1}",
+            "unknown figure 'search.fails.fell_in",
+        ),
     ],
 )
 def test_a_mistake_is_one_line_that_names_it(

@@ -9,7 +9,7 @@ import pytest
 
 from actuated_characters.boundary.file import read_search
 from actuated_characters.boundary.picture import PICTURE, draw
-from actuated_characters.boundary.survey import Survey, is_over, survey
+from actuated_characters.boundary.survey import Survey, is_over, keep_ends, survey
 from actuated_characters.boundary.table import boundary_records
 from actuated_characters.sweep.grid import Cell
 from actuated_characters.sweep.journal import Done, Journal
@@ -72,6 +72,7 @@ def searched(folder: Path, workers: Here, name: str) -> tuple[Survey, Mapping[in
     with Journal(folder / name, {}) as journal:
         report = survey(found, folder / name, workers, journal)
         assert report.undone == []
+        assert keep_ends(found, folder / name, workers, journal).undone == []
         assert not any(each.difference for each in journal.verified.values())
         return found, dict(journal.done)
 
@@ -110,15 +111,17 @@ def test_the_runs_at_the_boundary_are_made_once_more_with_their_bags(tmp_path: P
 def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path, most: int) -> None:
     whole, _ = searched(tmp_path, Here(1), "whole")
     with Journal(tmp_path / "cut", {}) as journal, pytest.raises(RunError):
-        assert not is_over(started(tmp_path), journal)
-        survey(started(tmp_path), tmp_path / "cut", Here(4, most), journal)
+        assert not is_over(started(tmp_path), tmp_path, journal)
+        cut, workers = started(tmp_path), Here(4, most)
+        survey(cut, tmp_path / "cut", workers, journal)
+        keep_ends(cut, tmp_path / "cut", workers, journal)
     workers = Here(5)
 
     again, _ = searched(tmp_path, workers, "cut")
 
     assert again.rows == whole.rows
     with Journal(tmp_path / "cut", {}) as journal:
-        assert is_over(started(tmp_path), journal)
+        assert is_over(started(tmp_path), tmp_path, journal)
     assert len(workers.asked) == len(whole.rows) + len(whole.points) - most
 
 
@@ -137,6 +140,29 @@ def test_a_point_whose_run_cannot_be_is_told_and_the_others_are_found(tmp_path: 
     assert [bool(point.error) for point in found.points] == [False, True, False]
     assert re.fullmatch(r"row \d+: no", found.points[1].error)
     assert boundary_records(found, done)[0]["fails"] == 7
+
+
+def test_a_run_without_the_figure_is_an_error_of_its_point(tmp_path: Path) -> None:
+    class Fixed(Here):
+        def outcome(self, impulse: int, side: int) -> Outcome:
+            return Outcome({"fell": None}, "", "hash")
+
+    found, _ = searched(tmp_path, Fixed(6), "results")
+
+    assert found.points[0].error == "row 1: it has no figure 'fell'"
+    assert len(found.rows) == len(found.points) * 5  # the even values alone
+
+
+def test_without_bags_nothing_is_made_twice(tmp_path: Path) -> None:
+    (tmp_path / "search.yaml").write_text(FILE + "bags: none\n")
+    found = Survey(read_search(tmp_path / "search.yaml", OPTIONS, ("fell",)))
+    workers = Here(1)
+    with Journal(tmp_path / "out", {}) as journal:
+        survey(found, tmp_path / "out", workers, journal)
+        keep_ends(found, tmp_path / "out", workers, journal)
+        assert is_over(found, tmp_path / "out", journal)
+
+    assert len(workers.asked) == len(found.rows)
 
 
 def test_a_run_that_diverges_has_failed(tmp_path: Path) -> None:

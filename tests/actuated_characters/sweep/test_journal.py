@@ -64,7 +64,7 @@ def test_a_journal_cut_in_its_first_line_begins_anew(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("made_of", "error"),
     [
-        ({**MADE_OF, "rows": "xy"}, "is of another sweep, or a file that it names has changed"),
+        ({**MADE_OF, "rows": "xy"}, "is of another file, or a file that it names has changed"),
         ({**MADE_OF, "mujoco-core": "5"}, r"was made with mujoco-core 4.0.1 \(now 5\)"),
     ],
 )
@@ -90,7 +90,7 @@ def test_what_is_no_journal_is_a_line(tmp_path: Path, content: str) -> None:
 
 
 def test_two_sweeps_do_not_write_to_one_directory(tmp_path: Path) -> None:
-    with Journal(tmp_path, MADE_OF), pytest.raises(RunError, match="another sweep writes to"):
+    with Journal(tmp_path, MADE_OF), pytest.raises(RunError, match="another command writes to"):
         Journal(tmp_path, MADE_OF)
 
     kept(tmp_path)
