@@ -3,7 +3,7 @@
 import logging
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
@@ -16,6 +16,7 @@ from distributed import Client, KilledWorker, LocalCluster, Security
 from actuated_characters.runs.held_signals import signals_held
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.runtime.worker_processes import interrupts_blocked
+from msgs_config.versions import engine_versions
 
 T = TypeVar("T")
 Item = TypeVar("Item")
@@ -84,7 +85,8 @@ def joined_cluster(address: str) -> Iterator[Client]:
     """The cluster whose scheduler has that address.
 
     Raises:
-        ConfigurationError: there is none, or one of its workers has not this package.
+        ConfigurationError: there is none, or one of its workers has not this package,
+            or other engines.
     """
     with _quiet(), dask.config.set(_CONFIGURATION), ExitStack() as at_end:
         try:
@@ -101,13 +103,23 @@ def joined_cluster(address: str) -> Iterator[Client]:
 
 
 def _check_workers(client: Client) -> None:
-    """Check that the workers have this package: one that has not dies of what it is sent."""
+    """Check that the workers have this package, or they die of what they are sent; and engines."""
     found = client.run(find_spec, _PACKAGE, on_error="return")
     without = [address for address, spec in found.items() if spec is None]
     if without:
         raise ConfigurationError(
             f"the worker {without[0]} has no {_PACKAGE}; install it in the Python that runs it"
         )
+    here = engine_versions()
+    for address, versions in client.run(engine_versions, on_error="return").items():
+        if not isinstance(versions, Mapping):  # it has died meanwhile
+            continue
+        other = [name for name in here if versions[name] != here[name]]
+        if other:
+            raise ConfigurationError(
+                f"the worker {address} has {other[0]} {versions[other[0]]} (here "
+                f"{here[other[0]]}); install the same there"
+            )
 
 
 def _leave(client: Client) -> None:

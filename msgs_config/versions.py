@@ -2,9 +2,11 @@
 
 import platform
 from collections.abc import Mapping
+from functools import cache
 from importlib import metadata
 
 _PACKAGES = ("actuated_characters", "pybullet", "mujoco-core", "numpy", "ros-jazzy-rclpy")
+_ENGINES = ("actuated_characters", "mujoco-core", "pybullet")
 _UNKNOWN_VERSION = "unknown"
 
 
@@ -18,6 +20,13 @@ def installed_versions() -> dict[str, str]:
             versions[package] = _UNKNOWN_VERSION
     versions["libc"] = " ".join(filter(None, platform.libc_ver())) or _UNKNOWN_VERSION
     return versions
+
+
+@cache
+def engine_versions() -> Mapping[str, str]:
+    """Those that the states of a run in lockstep depend on, in this process."""
+    versions = installed_versions()
+    return {name: versions[name] for name in _ENGINES}
 
 
 def read_versions(content: object) -> dict[str, str]:

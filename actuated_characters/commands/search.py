@@ -58,9 +58,10 @@ def _search(options: argparse.Namespace) -> int:
     from actuated_characters.commands.common.row_runs import asked_run, row_options
     from actuated_characters.sweep.grid import rows_to_check
     from actuated_characters.sweep.journal import Journal, fingerprint
-    from actuated_characters.sweep.row import FIGURES, ROWS, engine_versions
+    from actuated_characters.sweep.row import FIGURES, ROWS
     from actuated_characters.sweep.table import PARQUET, TABLE
     from actuated_characters.sweep.work import check_rows
+    from msgs_config.versions import engine_versions
 
     check_row_workers(options)
     search = read_search(options.file, row_options(), FIGURES)

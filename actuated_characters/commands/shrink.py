@@ -2,6 +2,7 @@
 
 import argparse
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from rich.console import Console
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import say
 from actuated_characters.commands.common.settings import Commands, add_bag, add_command
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, RunError
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.shrink.minimal import Sizes
@@ -43,6 +44,8 @@ def add_shrink(commands: "Commands[argparse.ArgumentParser]") -> None:
 def _shrink(options: argparse.Namespace) -> None:
     from actuated_characters.bags.format.metadata import BAG
     from actuated_characters.recorder.run_directory import (
+        LOGS,
+        PARAMETERS,
         prepare_directory,
         prepare_free_directory,
     )
@@ -65,11 +68,14 @@ def _shrink(options: argparse.Namespace) -> None:
         trials = Trials(shrinking, Path(folder))
         try:
             sizes = _searched(trials)
-        except KeyboardInterrupt:
-            if trials.best is None:
-                raise
-            say("interrupted; the best so far, which may not be the least:")
-            _write(shrinking, trials.best, directory)
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and trials.best is not None:
+                say("interrupted; the best so far, which may not be the least:")
+                _write(shrinking, trials.best, directory)
+            else:
+                for folder in (directory / PARAMETERS, directory / LOGS, directory):
+                    with suppress(OSError):  # it is not empty
+                        folder.rmdir()
             raise
     _write(shrinking, sizes, directory)
 
@@ -100,12 +106,13 @@ def _write(shrinking: "Shrinking", sizes: "Sizes", directory: Path) -> None:
 
     run_shrunk(shrinking, sizes, directory)
     plot_metrics(directory)
-    metrics = read_metrics(directory)[0]
-    total = shrinking.total
+    fell_at, total = read_metrics(directory)[0]["fell_at_s"], shrinking.total
+    if fell_at is None:
+        raise RunError(f"with what was left it does not fall in a whole run: {directory}")
     if not sizes:
-        print(f"it falls at {metrics['fell_at_s']:.3g} s without any of its {total} inputs")
+        print(f"it falls at {fell_at:.3g} s without any of its {total} inputs")
     else:
-        print(f"{len(sizes)} of {total} inputs; it falls at {metrics['fell_at_s']:.3g} s with")
+        print(f"{len(sizes)} of {total} inputs; it falls at {fell_at:.3g} s with")
     for line in shrinking.describe(sizes):
         print(f"  {line}")
     print(f"the run: {directory / BAG}")

@@ -59,8 +59,9 @@ def _sweep(options: argparse.Namespace) -> int:
     from actuated_characters.sweep.file import read_sweep
     from actuated_characters.sweep.grid import rows_to_check
     from actuated_characters.sweep.journal import Journal, fingerprint
-    from actuated_characters.sweep.row import FIGURES, ROWS, engine_versions
+    from actuated_characters.sweep.row import FIGURES, ROWS
     from actuated_characters.sweep.work import Job, check_rows
+    from msgs_config.versions import engine_versions
 
     if not 0.0 <= options.verify <= 1.0:
         raise ConfigurationError(f"--verify is {options.verify:g}; it must be a share from 0 to 1")

@@ -92,12 +92,13 @@ def _trial(options: argparse.Namespace) -> int:
     require_extra("wheels", "trial")
     from actuated_characters.commands.common.row_runs import asked_run, row_options
     from actuated_characters.sweep.journal import Journal, fingerprint
-    from actuated_characters.sweep.row import ROWS, engine_versions
+    from actuated_characters.sweep.row import ROWS
     from actuated_characters.sweep.work import Job
     from actuated_characters.trial.controller_file import read_controller
     from actuated_characters.trial.results import FILMS, write_result
     from actuated_characters.trial.row import Trial
     from actuated_characters.trial.trial_set import find_set, read_set, shipped_sets
+    from msgs_config.versions import engine_versions
     from sim_node.physics.engine import DEFAULT_ENGINE
 
     count = worker_count(options)
@@ -107,7 +108,8 @@ def _trial(options: argparse.Namespace) -> int:
         raise ConfigurationError(
             f"{options.file} names no trials; --trials takes {', '.join(shipped_sets())} or a file"
         )
-    trials = read_set(find_set(named), controller, row_options(), DEFAULT_ENGINE)
+    folder = Path() if options.trials else controller.folder
+    trials = read_set(find_set(named, folder), controller, row_options(), DEFAULT_ENGINE)
     build(options.file, controller)
     trial = Trial(controller, trials.goals(), asked_run)
     for warning in check_trials(trial, trials):
@@ -115,7 +117,8 @@ def _trial(options: argparse.Namespace) -> int:
     directory = (options.output or _FOLDER / f"{controller.name}-{trials.name}").absolute()
     job = Job(trials.rows, directory, trials.bags)
     check_interruption()  # all modules are imported by now
-    made_of = fingerprint(trials.rows, engine_versions(), trials.bags)
+    goals = (f"{len(kind.rows)} {kind.goal}" for kind in trials.kinds)
+    made_of = fingerprint(trials.rows, engine_versions(), trials.bags, *goals)
     made_of["controller"] = controller.fingerprint()
     with Journal(directory, made_of, again=options.again) as journal:
         if journal.has_forgotten:
@@ -236,11 +239,12 @@ def _conclude(
     records = make_records(job.rows, journal.done, FIGURES)
     write_tables(job.directory, records)
     failures = [n for n in sorted(journal.done) if journal.done[n].outcome.has_failed]
-    shown = failures[: max(options.films, 0)]
-    with progress_bar("films", len(shown), "films", transient=True) as bar:
+    most = min(max(options.films, 0), len(failures))
+    with progress_bar("films", most, "films", transient=True) as bar:
         films = make_films(
             job.directory,
-            shown,
+            failures,
+            most,
             as_films=is_installed("video"),
             progress=lambda done: bar.update(bar.task_ids[0], completed=done),
         )

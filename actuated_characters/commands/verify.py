@@ -99,5 +99,5 @@ def _verify(options: argparse.Namespace) -> int:
     different = {number: text for number, text in found.items() if text}
     print(f"{len(found)} of {len(done)} rows were run again, {len(different)} differ")
     for number, text in different.items():
-        print(f"error: row {number} differs: {text}", file=sys.stderr)
+        print(f"error: row {number} {text}", file=sys.stderr)
     return int(bool(different))

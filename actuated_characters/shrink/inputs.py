@@ -306,4 +306,4 @@ def _number(value: float) -> str:
 
 def _seconds(time: float) -> str:
     """A time of a tick, to a tenth of a millisecond."""
-    return f"{round(time, 4):g}"
+    return _number(round(time, 4))

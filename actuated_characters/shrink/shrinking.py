@@ -104,7 +104,9 @@ class Trials:
     def __post_init__(self) -> None:
         fork = self.shrinking.fork
         plan = with_files(fork.plan, fork.recording, self.folder)
-        self.setting = TrialSetting(fork.recording, plan, plan.ticks, self.folder)
+        own = self.folder / "trial"  # apart from the recording's own keyframe, which `plan` names
+        own.mkdir()
+        self.setting = TrialSetting(fork.recording, plan, plan.ticks, own)
 
     def repeat(self) -> None:
         """Repeat the recording to its fall, with all inputs, to the bit.

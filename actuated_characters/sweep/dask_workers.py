@@ -13,9 +13,10 @@ from typing import TypeAlias
 from distributed import Client, Future, KilledWorker, as_completed, get_worker
 
 from actuated_characters.cluster import WORKERS_DIED, lost
-from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute, engine_versions
+from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute
 from actuated_characters.sweep.work import Answer
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
+from msgs_config.versions import engine_versions
 
 _MOST_SHOWN = 300  # characters of an error that nobody foresaw
 _MOST_TRIES = 5  # of a row that another worker is to do

@@ -44,7 +44,7 @@ def fingerprint(rows: Iterable[Row], versions: Mapping[str, str], *also: object)
     for row in rows:
         digest.update(json.dumps(row.arguments).encode())
         files |= {Path(each) for text in row.arguments if (each := text.rpartition("=")[2])}
-    for file in sorted(file for file in files if _is_file(file)):
+    for file in sorted(file for file in files if is_file(file)):
         digest.update(f"{file} {sha256_of(file)}".encode())
     digest.update(" ".join(map(str, also)).encode())
     return {"rows": digest.hexdigest(), **versions}
@@ -161,7 +161,8 @@ def _mismatch(path: Path, found: object, wanted: Mapping[str, object]) -> str:
     return f"{path} {what}; choose another --output, or --again, which deletes it"
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether there is a file of that path, which may be any text."""
     try:
         return path.is_file()
     except (OSError, ValueError):  # a text that is no path

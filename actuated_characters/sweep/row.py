@@ -6,7 +6,6 @@ import socket
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,7 +18,6 @@ from actuated_characters.runs.plan import RunPlan
 from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.sweep.grid import Cell
 from msgs_config.errors import ActuatedCharactersError, RecordingError
-from msgs_config.versions import installed_versions
 
 FIGURES = (
     *("ticks", "sim_time_s", "actuators", "root_actuators", "degrees_of_freedom"),
@@ -30,7 +28,6 @@ FIGURES = (
     *("missing_ticks", "dropped_references"),
 )
 """Of a run's summary, those that are the same whenever and wherever it is computed again."""
-_ENGINES = ("actuated_characters", "mujoco-core", "pybullet")
 _THREADS = "controller_node.plan.workers"
 ROWS = "rows"
 """The folder of the bags that are kept."""
@@ -76,13 +73,6 @@ class Outcome:
         """Whether its character fell, or did not pass a trial, or there was an error."""
         fell, survived = self.figures.get("fell"), self.figures.get("survived")
         return bool(self.error) or fell is True or survived is False
-
-
-@cache
-def engine_versions() -> Mapping[str, str]:
-    """The versions that a row's last bits depend on, in this process."""
-    versions = installed_versions()
-    return {name: versions[name] for name in _ENGINES}
 
 
 def row_directory(results: Path, number: int) -> Path:

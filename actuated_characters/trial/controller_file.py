@@ -10,6 +10,7 @@ from shlex import split
 from typing import Any
 
 from actuated_characters.runs.foreign_controller import PLACES, ForeignController, fill
+from actuated_characters.sweep.journal import is_file
 from msgs_config.digests import sha256_of
 from msgs_config.errors import ConfigurationError
 from msgs_config.file_kinds import refuse_other_kind
@@ -42,7 +43,7 @@ class Controller:
         command = () if self.foreign is None else self.foreign.command
         places = {"folder": str(self.folder)}
         files = {word: self.folder / fill(word, places) for word in command}
-        return {word: sha256_of(path) for word, path in files.items() if path.is_file()}
+        return {word: sha256_of(path) for word, path in files.items() if is_file(path)}
 
     def fingerprint(self) -> str:
         """A few letters that are others if what is started is another one, or in another way."""

@@ -63,11 +63,12 @@ def survival_table(trials: TrialSet, done: Mapping[int, Done]) -> Table:
 def make_films(
     directory: Path,
     failures: Sequence[int],
+    most: int,
     *,
     as_films: bool,
     progress: Callable[[int], object] = lambda done: None,
 ) -> dict[int, Film | Illustration]:
-    """Films, or strips of pictures, of rows whose bags are kept; by the row's number.
+    """Films, or strips of pictures, of the first rows whose bags are kept; by the row's number.
 
     Raises:
         RecordingError: a film cannot be written.
@@ -75,7 +76,9 @@ def make_films(
     made = dict[int, Film | Illustration]()
     if failures and as_films:
         (directory / FILMS).mkdir(exist_ok=True)
-    for done, number in enumerate(failures, start=1):
+    for number in failures:
+        if len(made) >= most:
+            break
         try:
             recording = read_recording(row_directory(directory, number))
         except ActuatedCharactersError:  # it ended before there was anything to be seen
@@ -88,7 +91,7 @@ def make_films(
             content = BytesIO()
             imsave(content, strip(recording, _STILLS), format="png")
             made[number] = Illustration(f"{number:05d}", content.getvalue(), f"row {number}")
-        progress(done)
+        progress(len(made))
     return made
 
 

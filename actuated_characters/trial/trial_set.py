@@ -71,14 +71,14 @@ def shipped_sets() -> list[str]:
     return sorted(path.stem for path in _SHIPPED.glob("*.yaml"))
 
 
-def find_set(name: str) -> Path:
-    """The file of a set that is given by its name or path.
+def find_set(name: str, folder: Path = Path()) -> Path:
+    """The file of a set that is given by its name, or by a path that is relative to a folder.
 
     Raises:
         ConfigurationError: there is none of that name.
     """
     if Path(name).suffix:
-        return Path(name)
+        return folder / name
     if name not in shipped_sets():
         sentence = one_of("set of trials", name, shipped_sets())
         raise ConfigurationError(f"{sentence}; or the path of a .yaml file")
@@ -144,7 +144,7 @@ def _merged(common: MappingReader, part: MappingReader | None) -> dict[str, Any]
         given = [each.content[key] for each in readers if key in each.content]
         if given:
             merged[key] = given[-1]
-    texts = json.dumps([merged["run"], merged["set"]])
+    texts = json.dumps([merged["run"], merged["set"]], ensure_ascii=False)
     own = set() if part is None else set(part.part("values").content)
     merged["values"] = {
         name: value

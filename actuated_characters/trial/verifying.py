@@ -8,7 +8,7 @@ from actuated_characters.sweep.journal import Done
 from actuated_characters.sweep.row import RowTask
 from actuated_characters.sweep.work import Workers, compared
 from actuated_characters.trial.results import Result
-from msgs_config.errors import ConfigurationError, RunError
+from msgs_config.errors import ConfigurationError
 from msgs_config.versions import installed_versions
 
 _SEED = 0  # of which rows are among a share
@@ -35,10 +35,10 @@ def verify(
     workers: Workers,
     progress: Callable[[], object],
 ) -> dict[int, str]:
-    """Run rows once more; what differs in each, empty if nothing does.
+    """Run rows once more; what there is to say of each, empty if it is as it was.
 
     Raises:
-        RunError: a row could not be run.
+        RunError: no more answers will come.
     """
     waiting, asked, found = list(reversed(tasks)), 0, dict[int, str]()
     while waiting or asked:
@@ -49,12 +49,11 @@ def verify(
         asked -= 1
         number = answer.task.number
         if answer.outcome is None:
-            raise RunError(f"row {number} could not be run: {answer.failure}")
-        before = done[number]
-        told = compared(
-            _without_words(before), _without_words(Done(number, answer.outcome, answer.by))
-        )
-        found[number] = told.difference
+            found[number] = f"could not be run: {answer.failure}"
+        else:
+            again = Done(number, answer.outcome, answer.by)
+            told = compared(_without_words(done[number]), _without_words(again))
+            found[number] = told.difference and f"differs: {told.difference}"
         progress()
     return dict(sorted(found.items()))
 

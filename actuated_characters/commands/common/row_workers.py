@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.interruption import check_interruption
+from actuated_characters.commands.common.progress import say
 from msgs_config.errors import ConfigurationError
 
 if TYPE_CHECKING:  # it takes a second to import
@@ -63,6 +64,8 @@ def row_workers(options: argparse.Namespace, directory: Path) -> "Iterator[Worke
     check_interruption()
     if options.scheduler is not None:
         with joined_cluster(options.scheduler) as client:
+            if not client.nthreads():
+                say("no worker has joined yet; it waits for the first one")
             yield DaskWorkers(client, asked_run)
         return
     scratch = directory / _SCRATCH

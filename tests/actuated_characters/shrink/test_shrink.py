@@ -16,6 +16,7 @@ from actuated_characters.shrink.inputs import Event, Setting
 from actuated_characters.shrink.minimal import SHARE
 from actuated_characters.shrink.shrinking import Shrinking, Trials, plan_shrinking
 from actuated_characters.shrink.trial import Keyframe, Outcome, TrialSetting, run_trial
+from msgs_config.errors import ReplayError
 from msgs_config.messages.keyframe import decode_keyframe
 from sim_node.interface.keyframes import read_memory
 from sim_node.physics.simulation import Simulation
@@ -120,6 +121,39 @@ def test_a_trial_from_a_keyframe_is_the_whole_one_to_the_bit(
     last, same = whole.keyframes[-1], again.keyframes[-1]
     assert last.row == same.row > 240
     assert state_in(last, setting) == state_in(same, setting)
+
+
+def test_trials_from_the_start_of_a_fork_begin_with_its_keyframe(tmp_path: Path) -> None:
+    period = ("--set", "sim_node.keyframe_period:=0.25")
+    pushed = run(tmp_path / "pushed", 1.0, *period)
+    fork = ("--at", "0.6", "--push", "chest:0,900,0@0.7", "--duration", "1.6")
+    assert main(["fork", str(pushed), *fork, "--output", str(tmp_path / "fork")]) == 0
+    plan = plan_shrinking(tmp_path / "fork")
+    assert plan.fork.recording.keyframe is not None
+    setting, events = Trials(plan, tmp_path).setting, plan.events({0: 1.0})
+
+    first = run_trial(setting, events, None)
+    run_trial(setting, events, first.keyframes[-1])
+    again = run_trial(setting, events, None)
+
+    assert [each.row for each in first.keyframes] == [each.row for each in again.keyframes]
+    assert state_in(first.keyframes[0], setting) == state_in(again.keyframes[0], setting)
+
+
+def test_a_recording_that_is_not_repeated_leaves_nothing(
+    fallen: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def other(*given: object, **named: object) -> Outcome:
+        raise ReplayError("tick 3 differs")
+
+    monkeypatch.setattr(shrinking_module, "run_trial", other)
+    assert main(["shrink", str(fallen), "--output", str(tmp_path / "out")]) == 1
+
+    assert capsys.readouterr().err.endswith("error: tick 3 differs\n")
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_interruption_keeps_the_best_so_far(

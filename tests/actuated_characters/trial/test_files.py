@@ -166,3 +166,29 @@ def test_each_shipped_set_has_an_engine_that_every_python_has(name: str, tmp_pat
     for kind in chosen.kinds:
         for row in kind.to_check():
             trial.check(row.number, row.arguments)
+
+
+def test_values_for_all_kinds_may_have_names_in_any_alphabet(tmp_path: Path) -> None:
+    text = (
+        "values: {größe: [1, 2]}\n"
+        'trials: {pushes: {run: {push: "chest:{größe},0,0@0.1"}}, rests: {run: {duration: 1.0}}}\n'
+    )
+    (tmp_path / "mine.yaml").write_text(text, "utf-8")
+    (tmp_path / "own.yaml").write_text("controller_node: {}\n", "utf-8")
+    own = read_controller(tmp_path / "own.yaml")
+
+    chosen = read_set(tmp_path / "mine.yaml", own, row_options(), "mujoco")
+
+    assert [len(kind.rows) for kind in chosen.kinds] == [2, 1]
+
+
+def test_a_long_word_of_a_command_is_no_file(tmp_path: Path) -> None:
+    words = "x" * 300
+    (tmp_path / "mine.yaml").write_text(f"command: [bash, -c, {words}]\n", "utf-8")
+
+    assert read_controller(tmp_path / "mine.yaml").digests() == {}
+
+
+def test_a_set_that_a_controllers_file_names_is_beside_it(tmp_path: Path) -> None:
+    assert find_set("sets/mine.yaml", tmp_path) == tmp_path / "sets" / "mine.yaml"
+    assert find_set("lift", tmp_path) == find_set("lift")

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import actuated_characters as ac
+from actuated_characters.cli import main
 from actuated_characters.trial.results import read_done
 from msgs_config.messages.state import StampedState
 from tests.support.programs import PROJECT
@@ -253,3 +254,16 @@ def test_ctrl_c_keeps_what_is_done_and_leaves_nothing_behind(
     assert "the same command goes on" in run.process.stderr
     wait_until(lambda: not run.family, "the end of all its processes", LONG)
     assert not (tmp_path / "result" / ".workers").exists()
+
+
+def test_another_goal_is_another_trial(
+    result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = files(tmp_path, trials=SET.replace("[0.9, 1.1]", "[0.8, 1.1]"))
+    shutil.copytree(result, tmp_path / "result")
+
+    assert main([*words, "--films", "0"]) == 1
+
+    assert "rows.jsonl is of another file, or a file that it names has changed" in (
+        capsys.readouterr().err
+    )
