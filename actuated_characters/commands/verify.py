@@ -4,6 +4,7 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
@@ -17,6 +18,10 @@ from actuated_characters.commands.trial import (
 )
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.runtime.extras import require_extra
+
+if TYPE_CHECKING:  # it takes a second to import
+    from actuated_characters.trial.controller_file import Controller
+    from actuated_characters.trial.trial_set import TrialSet
 
 
 def add_verify(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -55,40 +60,26 @@ def add_verify(commands: "Commands[argparse.ArgumentParser]") -> None:
 
 def _verify(options: argparse.Namespace) -> int:
     require_extra("wheels", "verify")
-    from actuated_characters.commands.common.row_runs import asked_run, row_options
+    from actuated_characters.commands.common.row_runs import asked_run
     from actuated_characters.sweep.work import Job
-    from actuated_characters.trial.controller_file import read_controller
-    from actuated_characters.trial.results import read_done, read_result
+    from actuated_characters.trial.results import read_done
     from actuated_characters.trial.row import Trial
-    from actuated_characters.trial.trial_set import read_set
-    from actuated_characters.trial.verifying import changes, chosen_rows, verify
+    from actuated_characters.trial.verifying import chosen_rows, verify
 
     count = worker_count(options)
     if not 0.0 <= options.share <= 1.0:
         raise ConfigurationError(f"--share is {options.share:g}; it must be from 0 to 1")
-    result = read_result(options.result)
+    controller, trials = _read(options)
     done = read_done(options.result)
+    rows = {row.number: row for row in trials.rows}
     if not done:
         raise RunError(f"{options.result}: none of its rows is done")
-    file = options.controller or result.controller
-    folder = file.absolute().parent if options.controller else result.folder
-    if not folder.is_dir():
-        raise ConfigurationError(
-            f"{folder}, where the controller was, is not there; --controller says where its file is"
-        )
-    controller = read_controller(file, folder)
-    trials = read_set(result.trials, controller, row_options(), result.engine)
-    build(file, controller)
-    for line in changes(result, controller.digests()):
-        say(f"note: {line}")
-    trial = Trial(controller, trials.goals(), asked_run)
-    check_trials(trial, trials)
-    rows = {row.number: row for row in trials.rows}
     if not done.keys() <= rows.keys():
         raise RunError(f"{options.result} has rows that its set of trials does not have")
+    trial = Trial(controller, trials.goals(), asked_run)
+    check_trials(trial, trials)
     job = Job(trials.rows, options.result.absolute())
-    numbers = chosen_rows(done, options.row, options.share)
-    tasks = [job.task(rows[number]) for number in numbers]
+    tasks = [job.task(rows[number]) for number in chosen_rows(done, options.row, options.share)]
     check_interruption()  # all modules are imported by now
     with (
         tempfile.TemporaryDirectory(prefix="verify-") as scratch,
@@ -101,3 +92,26 @@ def _verify(options: argparse.Namespace) -> int:
     for number, text in different.items():
         print(f"error: row {number} {text}", file=sys.stderr)
     return int(bool(different))
+
+
+def _read(options: argparse.Namespace) -> "tuple[Controller, TrialSet]":
+    """The controller and the set of a result; says what is otherwise than it was."""
+    from actuated_characters.commands.common.row_runs import row_options
+    from actuated_characters.trial.controller_file import read_controller
+    from actuated_characters.trial.results import read_result
+    from actuated_characters.trial.trial_set import read_set
+    from actuated_characters.trial.verifying import changes
+
+    result = read_result(options.result)
+    file = options.controller or result.controller
+    folder = file.absolute().parent if options.controller else result.folder
+    if not folder.is_dir():
+        raise ConfigurationError(
+            f"{folder}, where the controller was, is not there; --controller says where its file is"
+        )
+    controller = read_controller(file, folder)
+    trials = read_set(result.trials, controller, row_options(), result.engine)
+    build(file, controller)
+    for line in changes(result, controller.digests()):
+        say(f"note: {line}")
+    return controller, trials
