@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
 from actuated_characters.boundary.survey import Point, Survey
-from actuated_characters.boundary.table import heading
-from actuated_characters.sweep.grid import cell_text
+from actuated_characters.sweep.grid import cell_text, parameter_name
 from msgs_config.whole_files import writing
 
 PICTURE = "boundary.png"
@@ -61,8 +60,8 @@ def draw(found: Survey, file: Path) -> bool:
 
 
 def _title(found: Survey) -> str:
-    search = found.search
-    return f"{heading(search.value)} up to which runs hold, found to within {search.way.within:g}"
+    name, within = parameter_name(found.search.value), found.search.way.within
+    return f"{name} up to which runs hold, found to within {within:g}"
 
 
 def _varies(name: str, points: Sequence[Point]) -> bool:
@@ -73,7 +72,9 @@ def _panels(points: Sequence[Point], columns: Sequence[str]) -> list[tuple[str, 
     """The points by all that varies but what is drawn along, each with its title."""
     panels: dict[str, list[Point]] = {}
     for point in points:
-        title = ", ".join(f"{heading(name)} {cell_text(point.cells[name])}" for name in columns)
+        title = ", ".join(
+            f"{parameter_name(name)} {cell_text(point.cells[name])}" for name in columns
+        )
         panels.setdefault(title, []).append(point)
     return list(panels.items())
 
@@ -131,8 +132,8 @@ def _draw_along(axes: Axes, found: Survey, points: Sequence[Point], name: str) -
     ]
     _mark(axes, full, color=_ALL_HOLD, marker="^", label="nothing failed")
     _draw_holes(axes, found, places, points)
-    axes.set_xlabel(heading(name))
-    axes.set_ylabel(heading(found.search.value))
+    axes.set_xlabel(parameter_name(name))
+    axes.set_ylabel(parameter_name(found.search.value))
     axes.grid(alpha=0.3)
 
 

@@ -12,11 +12,6 @@ from msgs_config.whole_files import write_whole
 BOUNDARY = "boundary.csv"
 
 
-def heading(column: str) -> str:
-    """A column's name as people read it: parameters without their nodes."""
-    return column.partition(".")[2] or column
-
-
 def boundary_records(found: Survey, done: Mapping[int, Done]) -> list[Record]:
     """What is known of each point that was begun: its boundary, and the run whose bag shows it."""
     records: list[Record] = []

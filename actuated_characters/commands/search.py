@@ -151,11 +151,11 @@ def _conclude(found: "Survey", directory: Path, journal: "Journal", report: "Rep
 
 
 def _print_points(records: "Sequence[Record]") -> None:
-    from actuated_characters.boundary.table import heading
+    from actuated_characters.sweep.grid import parameter_name
 
     shown = [name for name in records[0] if name not in ("state_hash", "error")]
     rows = [[show(record[name]) for name in shown] for record in records]
-    Console().print(make_table("", list(map(heading, shown)), rows))
+    Console().print(make_table("", list(map(parameter_name, shown)), rows))
 
 
 def _print_summary(found: "Survey") -> None:

@@ -24,6 +24,7 @@ table { border-collapse: collapse; margin: .7rem 0; }
 caption { text-align: left; font-weight: 600; padding: .3rem 0; white-space: nowrap; }
 th, td { border-bottom: 1px solid var(--line); padding: .15rem .9rem .15rem 0;
          text-align: right; font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+th, td:first-child, td:nth-child(2):not(:last-child) { overflow-wrap: break-word; }
 th:first-child, td:first-child, td:nth-child(2):last-child { text-align: left; }
 tr:nth-child(even) td { background: var(--soft); }
 img, video { max-width: 100%; height: auto; background: white; border-radius: 6px; }

@@ -64,6 +64,11 @@ def rows_to_check(axes: Sequence[Axis], rows: Sequence[Row], most: int) -> list[
     return [rows[index] for index in indices]
 
 
+def parameter_name(column: str) -> str:
+    """A column's name as people read it: a parameter's without its node."""
+    return column.partition(".")[2] or column
+
+
 def cell_text(cell: Cell) -> str:
     """An entry as a text that reads back to the same bits."""
     if cell is None:

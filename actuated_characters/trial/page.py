@@ -18,12 +18,12 @@ from actuated_characters.report.page import (
     Table,
     render_page,
 )
-from actuated_characters.sweep.grid import Cell, Row
+from actuated_characters.sweep.grid import Cell, Row, parameter_name
 from actuated_characters.sweep.journal import Done
 from actuated_characters.sweep.row import row_directory
 from actuated_characters.sweep.table import TABLE, Record
 from actuated_characters.trial.results import FILMS
-from actuated_characters.trial.trial_set import KIND, TrialSet
+from actuated_characters.trial.trial_set import FIGURES, KIND, TrialSet
 from actuated_characters.trial.wilson import wilson_interval
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.runtime.extras import hint
@@ -33,6 +33,8 @@ from msgs_config.whole_files import write_whole
 PAGE = "index.html"
 _FILM_SIZE = (640, 360)  # pixels
 _STILLS = 6  # of a failure, where there are no films
+_FIRST, _LAST = ("row", KIND), ("survived", "failed_at_s", "state_hash")
+_WORDS = ("error", "verdict")  # why a row failed is in the first of these that is there
 
 
 def survived(done: Done) -> bool:
@@ -157,17 +159,20 @@ def _failures(
 
 
 def _rows_table(records: Sequence[Record]) -> Table:
-    """The table of the rows, with the beginning of the hashes, and without what is the same."""
-    left_out = ("actuators", "root_actuators", "ticks", "sim_time_s")
-    columns = [name for name in (records[0] if records else {}) if name not in left_out]
-    if KIND not in columns:
-        return Table([], ("row",))
-    rows = [[_cell(name, record[name]) for name in columns] for record in records]
-    return Table(rows, columns)
+    """The rows: what varies in each in a few words, its end, and the beginning of its hash."""
+    own = (*_FIRST, *_LAST, *_WORDS, *FIGURES)
+    rows = []
+    for record in records:
+        varies = {name: cell for name, cell in record.items() if name not in own}
+        words = [f"{parameter_name(n)} {_shown(c)}" for n, c in varies.items() if c is not None]
+        first, last = ([_cell(n, record[n]) for n in part] for part in (_FIRST, _LAST))
+        why = "" if record["survived"] else next((str(record[w]) for w in _WORDS if record[w]), "")
+        rows.append([*first, ", ".join(words) or NOT_KNOWN, *last, why or NOT_KNOWN])
+    return Table(rows, (*_FIRST, "what varies", *_LAST, "why"))
 
 
 def _cell(name: str, cell: Cell) -> str:
-    return str(cell)[:12] if name == "state_hash" and cell else _shown(cell)
+    return str(cell)[:8] if name == "state_hash" and cell else _shown(cell)
 
 
 def _shown(cell: Cell) -> str:
