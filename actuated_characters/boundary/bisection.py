@@ -73,8 +73,13 @@ def _even(way: Way) -> list[Value]:
     values = [way.first + share * (way.last - way.first) for share in shares]
     if way.whole:
         return list(dict.fromkeys([*map(round, values), way.last]))
-    return [*values, way.last]
+    return [*dict.fromkeys(map(_short, values)), way.last]
 
 
 def _between(a: Value, b: Value, whole: bool) -> Value:
-    return (int(a) + int(b)) // 2 if whole else 0.5 * (a + b)
+    return (int(a) + int(b)) // 2 if whole else _short(0.5 * (a + b))
+
+
+def _short(value: float) -> float:
+    """A number without the tail of digits that sums leave."""
+    return float(f"{value:.12g}")

@@ -96,6 +96,8 @@ def read_search(path: Path, options: Mapping[str, bool], figures: Sequence[str])
         ConfigurationError: something in it is wrong; names the place, and what would be right.
     """
     reader = open_file(path, "a search", (*PARTS, "bags", "search"))
+    if "search" not in reader.content:
+        raise ConfigurationError(f"{path} has no 'search:'; docs/search.md says what it holds")
     axes = read_axes(reader, options, [*figures, *_OWN_COLUMNS])
     part = reader.part("search")
     part.check_keys(_KEYS)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -16,7 +17,8 @@ from msgs_config.whole_files import writing
 PICTURE = "boundary.png"
 _MOST_PANELS, _PANELS_IN_ROW = 24, 4
 _PANEL = 3.0  # inches
-_HOLDS, _HOLE, _ALL_HOLD = "tab:green", "tab:blue", "tab:olive"
+_HOLDS, _ALL_HOLD, _HOLE, _FAILED = "tab:green", "tab:olive", "tab:blue", "tab:red"
+_WIDEST = math.radians(30.0)  # of a bar
 _Panels: TypeAlias = Sequence[tuple[str, Sequence[Point]]]
 
 
@@ -97,9 +99,16 @@ def _draw_around(
             boundary = found.boundary(point)
             if boundary.holds is None or (boundary.fails is None) != are_open:
                 continue
-            length, width = boundary.holds - begin, 0.9 * math.tau / len(points)
-            axes.bar(angle, length, width, begin, color=colour, alpha=0.6, label=label)
-    _draw_holes(axes, found, angles, points)
+            length = boundary.holds - begin
+            axes.bar(angle, length, _width(angles), begin, color=colour, alpha=0.6, label=label)
+    _draw_marks(axes, found, angles, points)
+
+
+def _width(angles: Sequence[float]) -> float:
+    """Of bars at angles, all in rad, which neither overlap nor say much of what was not tried."""
+    around = sorted({angle % math.tau for angle in angles})
+    gaps = (b - a for a, b in pairwise([*around, around[0] + math.tau]))
+    return 0.9 * min(*gaps, _WIDEST)
 
 
 def _limits(found: Survey, points: Sequence[Point]) -> tuple[float, float]:
@@ -131,21 +140,21 @@ def _draw_along(axes: Axes, found: Survey, points: Sequence[Point], name: str) -
         if each.fails is None
     ]
     _mark(axes, full, color=_ALL_HOLD, marker="^", label="nothing failed")
-    _draw_holes(axes, found, places, points)
+    _draw_marks(axes, found, places, points)
     axes.set_xlabel(parameter_name(name))
     axes.set_ylabel(parameter_name(found.search.value))
     axes.grid(alpha=0.3)
 
 
-def _draw_holes(
+def _draw_marks(
     axes: Axes, found: Survey, places: Sequence[float], points: Sequence[Point]
 ) -> None:
-    holes = [
-        (place, float(value))
-        for place, point in zip(places, points, strict=True)
-        for value in found.boundary(point).holes
-    ]
+    """Mark what holds beyond the first failure, and where nothing holds."""
+    boundaries = [(place, found.boundary(p)) for place, p in zip(places, points, strict=True)]
+    holes = [(place, float(value)) for place, each in boundaries for value in each.holes]
+    failed = [(place, float(found.search.way.first)) for place, b in boundaries if b.holds is None]
     _mark(axes, holes, color=_HOLE, marker="o", markersize=4, label="holds again")
+    _mark(axes, failed, color=_FAILED, marker="x", label="the first value fails")
 
 
 def _mark(axes: Axes, places: Sequence[tuple[float, float]], **style: Any) -> None:

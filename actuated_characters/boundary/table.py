@@ -29,7 +29,7 @@ def boundary_records(found: Survey, done: Mapping[int, Done]) -> list[Record]:
                 "tries": len(point.tried),
                 "row": row.number,
                 "state_hash": done[row.number].outcome.state_hash or None,
-                "error": point.error or None,
+                "error": point.error or done[row.number].outcome.error or None,
             }
         )
     return records

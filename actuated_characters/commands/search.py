@@ -172,4 +172,4 @@ def _print_summary(found: "Survey") -> None:
         ),
     ):
         if count:
-            print(f"{count} points {what}")
+            print(f"{count} of {len(boundaries)} points {what}")

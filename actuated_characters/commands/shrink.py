@@ -1,6 +1,7 @@
 """The command `actuated_characters shrink`: the fewest and smallest inputs with which it falls."""
 
 import argparse
+import shutil
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -26,9 +27,9 @@ def add_shrink(commands: "Commands[argparse.ArgumentParser]") -> None:
         "shrink",
         "the fewest and smallest inputs with which a run still falls",
         "Of a recorded run whose character fell, find the fewest and smallest inputs with which it "
-        "still falls: pushes, balls, commanded velocities, changed parameters. Without any of them "
-        "it does not fall, nor with 5 % less of one. The result is a run of its own, which can be "
-        "replayed. Ctrl-C keeps the best so far.",
+        "still falls, at most 1 s later: pushes, balls, commanded velocities, changed parameters. "
+        "Without any of them it does not, nor with 5 % less of one. The result is a run of its "
+        "own, which can be replayed. Ctrl-C keeps the best so far.",
         ["shrink runs/felled"],
     )
     add_bag(command)
@@ -98,21 +99,22 @@ def _searched(trials: "Trials") -> "Sizes":
 
 
 def _write(shrinking: "Shrinking", sizes: "Sizes", directory: Path) -> None:
-    """Run what is left into a directory, and say what it is."""
+    """Say what is left, and run it into a directory, whole or not at all."""
     from actuated_characters.bags.format.metadata import BAG
     from actuated_characters.recorder.run_directory import read_metrics
     from actuated_characters.report.metrics_plot import plot_metrics
     from actuated_characters.shrink.shrinking import run_shrunk
 
-    run_shrunk(shrinking, sizes, directory)
-    plot_metrics(directory)
-    fell_at, total = read_metrics(directory)[0]["fell_at_s"], shrinking.total
+    print(f"{len(sizes)} of {shrinking.total} inputs are left" + (":" if sizes else ""))
+    for line in [*shrinking.describe(sizes), f"--duration {shrinking.duration:g}"]:
+        print(f"  {line}", flush=True)
+    try:
+        run_shrunk(shrinking, sizes, directory)
+        plot_metrics(directory)
+        fell_at = read_metrics(directory)[0]["fell_at_s"]
+    except BaseException:
+        shutil.rmtree(directory, ignore_errors=True)  # a part of it would look like the whole
+        raise
     if fell_at is None:
-        raise RunError(f"with what was left it does not fall in a whole run: {directory}")
-    if not sizes:
-        print(f"it falls at {fell_at:.3g} s without any of its {total} inputs")
-    else:
-        print(f"{len(sizes)} of {total} inputs; it falls at {fell_at:.3g} s with")
-    for line in shrinking.describe(sizes):
-        print(f"  {line}")
-    print(f"the run: {directory / BAG}")
+        raise RunError(f"with what is left it does not fall in a whole run: {directory}")
+    print(f"it falls at {fell_at:.3g} s; the run: {directory / BAG}")

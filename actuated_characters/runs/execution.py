@@ -237,12 +237,18 @@ def wait_for_end(
         if ticks < 2 and time.monotonic() > start_deadline:
             raise ControllerError(
                 f"no answer within {start_timeout:g} s; {simulator.name} says: "
-                f"{simulator.last_warning(0, _REJECTED) or simulator.last_words()}"
+                f"{_last_said(simulator)}"
             )
         time.sleep(_POLL_PERIOD)
     if simulator.exit_code:
         kind = ControllerError if simulator.exit_code > 0 else RunError  # else it was killed
         raise kind(f"{simulator.name} failed: {_reason(simulator)}")
+
+
+def _last_said(simulator: Member) -> str:
+    """What it says of a command, or what it waits for."""
+    found = (simulator.last_warning(0, saying) for saying in (_REJECTED, ""))
+    return next(filter(None, found), simulator.last_words())
 
 
 def _reason(simulator: Member) -> str:

@@ -17,7 +17,8 @@ from msgs_config.errors import RunError
 PLACES = ("python", "folder", "session", "parameters")
 """What braces in a command stand for: this Python, where the command is from, the session of the
 run, and the YAML file of the parameters that `controller_node` would have."""
-_PLACE = re.compile(r"\{([a-z]+)\}")
+PLACE = re.compile(r"\{([a-z]+)\}")
+"""A name in braces."""
 _PATIENCE = 5.0  # s that a controller has to end after SIGINT
 
 
@@ -54,7 +55,7 @@ class ForeignController:
 
 def fill(text: str, values: Mapping[str, str]) -> str:
     """A text with the values of its places; braces around anything else stay."""
-    return _PLACE.sub(lambda place: values.get(place[1], place[0]), text)
+    return PLACE.sub(lambda place: values.get(place[1], place[0]), text)
 
 
 class Program(Child):

@@ -16,6 +16,8 @@ from actuated_characters.runs.planned.throws import PlannedThrow
 from actuated_characters.runs.planned.velocities import PlannedVelocity
 from actuated_characters.runs.planned.wrenches import PlannedPush
 
+STEER = "--cmd-vel "
+"""Begins the description of a velocity."""
 _DIGITS = 12  # of the numbers of what was made smaller
 _LEAST_MASS = 1e-3  # kg, of a throw
 
@@ -148,9 +150,8 @@ class VelocityInput(Input):
 
     def describe(self, size: float) -> str:
         """What `--cmd-vel` has of it."""
-        return (
-            f"--cmd-vel {_listed(_numbers(_slower(self.sent[0][1], size)))}@{_seconds(self.time)}"
-        )
+        velocity = _listed(_numbers(_slower(self.sent[0][1], size)))
+        return f"{STEER}{velocity}@{_seconds(self.time)}"
 
 
 @dataclass(frozen=True)

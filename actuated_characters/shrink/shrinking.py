@@ -12,7 +12,7 @@ from actuated_characters.fork.plan import ForkInputs, ForkPlan, plan_fork
 from actuated_characters.metrics.falls import FALLEN_TIME
 from actuated_characters.metrics.recording_metrics import fall_time
 from actuated_characters.runs.in_process import Progress
-from actuated_characters.shrink.inputs import Event, Input, without_needless_stops
+from actuated_characters.shrink.inputs import STEER, Event, Input, without_needless_stops
 from actuated_characters.shrink.minimal import Sizes, shrunk
 from actuated_characters.shrink.reading import read_inputs
 from actuated_characters.shrink.trial import Keyframe, TrialSetting, run_trial, script_of
@@ -55,9 +55,17 @@ class Shrinking:
         return without_needless_stops(sorted(events, key=lambda event: event.stop))
 
     def describe(self, sizes: Sizes) -> list[str]:
-        """A line for each input that is left, in the order of their times."""
+        """A line for each input that is left, in the order of their times; velocities in one."""
         left = sorted(sizes, key=lambda number: self.inputs[number].row)
-        return [self.inputs[number].describe(sizes[number]) for number in left]
+        lines = [self.inputs[number].describe(sizes[number]) for number in left]
+        velocities = [line.removeprefix(STEER) for line in lines if line.startswith(STEER)]
+        others = [line for line in lines if not line.startswith(STEER)]
+        return [f'{STEER}"{" ".join(velocities)}"', *others] if velocities else others
+
+    @property
+    def duration(self) -> float:
+        """Of the run of what is left, s."""
+        return self.fork.plan.ticks / self.fork.plan.simulation.rate_hz
 
 
 def plan_shrinking(path: Path) -> Shrinking:

@@ -5,14 +5,15 @@ import shutil
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from shlex import split
 from typing import Any
 
-from actuated_characters.runs.foreign_controller import PLACES, ForeignController, fill
+from actuated_characters.runs.foreign_controller import PLACE, PLACES, ForeignController, fill
 from actuated_characters.sweep.journal import is_file
 from msgs_config.digests import sha256_of
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ConfigurationError, one_of
 from msgs_config.file_kinds import refuse_other_kind
 from msgs_config.files import parse_yaml_mapping, read_text
 from msgs_config.mappings import MappingReader
@@ -114,6 +115,11 @@ def _words(reader: MappingReader, key: str) -> tuple[str, ...]:
         raise reader.wrong(key, value, f"a command ({error})") from error
     if not isinstance(words, list) or not words or not all(isinstance(each, str) for each in words):
         raise reader.wrong(key, value, "a command: a text, or a list of texts")
+    for name in (name for word in words for name in PLACE.findall(word)):
+        if name not in PLACES and get_close_matches(name, PLACES):
+            raise ConfigurationError(
+                f"{reader.place}: {key}: {one_of('place', name, list(PLACES))}"
+            )
     return tuple(words)
 
 

@@ -68,6 +68,8 @@ def read_result(directory: Path) -> Result:
         RunError: it is none.
     """
     path = directory / RESULT
+    if not path.is_file():
+        raise RunError(f"{directory} holds no results of `trial`")
     try:
         content: dict[str, Any] = json.loads(read_text(path, RunError))
         if content["trial"] != _FORMAT:

@@ -1,12 +1,13 @@
 """The picture of a search: between which values it is drawn."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 from actuated_characters.boundary.bisection import Value, Way
 from actuated_characters.boundary.file import Search
-from actuated_characters.boundary.picture import _limits, draw
+from actuated_characters.boundary.picture import _limits, _width, draw
 from actuated_characters.boundary.survey import Survey
 from actuated_characters.sweep.grid import Choice
 
@@ -38,3 +39,13 @@ def test_all_that_was_found_is_within_the_axes(
 
     assert _limits(found, found.points) == pytest.approx(expected)
     assert draw(found, tmp_path / "picture.png")
+
+
+@pytest.mark.parametrize(
+    ("degrees", "expected"),
+    [([0, 90], 27.0), ([80, 90, 100], 9.0), ([350, 0], 9.0), ([-90, 270], 27.0), ([45], 27.0)],
+)
+def test_bars_do_not_overlap(degrees: list[int], expected: float) -> None:
+    angles = [math.radians(each) for each in degrees]
+
+    assert math.degrees(_width(angles)) == pytest.approx(expected)

@@ -192,3 +192,12 @@ def test_a_long_word_of_a_command_is_no_file(tmp_path: Path) -> None:
 def test_a_set_that_a_controllers_file_names_is_beside_it(tmp_path: Path) -> None:
     assert find_set("sets/mine.yaml", tmp_path) == tmp_path / "sets" / "mine.yaml"
     assert find_set("lift", tmp_path) == find_set("lift")
+
+
+def test_a_place_that_is_misspelt_is_named_and_braces_of_a_shell_are_left(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text('command: ["{pyton}", law.py]\n', "utf-8")
+    with pytest.raises(ConfigurationError, match="command: unknown place 'pyton'"):
+        read_controller(tmp_path / "mine.yaml")
+
+    (tmp_path / "mine.yaml").write_text("command: [bash, -c, 'echo ${x} {a,b} {home}']\n", "utf-8")
+    assert read_controller(tmp_path / "mine.yaml").foreign is not None
