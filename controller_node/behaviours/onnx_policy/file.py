@@ -19,7 +19,12 @@ from controller_node.behaviours.onnx_policy.description import (
 )
 from controller_node.behaviours.onnx_policy.session import Network
 from controller_node.behaviours.onnx_policy.terms import QUATERNIONS, TERMS, TermOptions
-from controller_node.behaviours.onnx_policy.trainers import from_deploy, from_metadata, is_deploy
+from controller_node.behaviours.onnx_policy.trainers import (
+    from_deploy,
+    from_metadata,
+    is_deploy,
+    without_slice_tags,
+)
 from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.errors import ConfigurationError, one_of
@@ -56,9 +61,8 @@ def read_description(network: Network) -> Description:
     """
     path, content = description_path(network.path), from_metadata(network.metadata)
     if path.exists():
-        given = files.parse_yaml_mapping(
-            path, files.read_text(path, ConfigurationError), ConfigurationError
-        )
+        text = without_slice_tags(files.read_text(path, ConfigurationError))
+        given = files.parse_yaml_mapping(path, text, ConfigurationError)
         content |= from_deploy(path, given) if is_deploy(given) else given
         place = path
     else:

@@ -17,6 +17,7 @@ _NAMES = ("joint_names", "observation_names", "command_names", "body_names")
 _NUMBERS = ("default_joint_pos", "joint_stiffness", "joint_damping", "action_scale")
 _HISTORY = "observation_history_lengths"
 _RELATIVE = {"joint_pos": "joint_pos_rel"}  # those tasks name it so, and subtract the default pose
+_SLICE = "!!python/object/apply:builtins.slice"
 _MOTOR_ORDER = "joint_ids_map"
 _ACTION = "JointPositionAction"
 
@@ -62,6 +63,11 @@ def _number(text: str) -> Any:
     except ValueError:
         return text
     return int(number) if number.is_integer() else number
+
+
+def without_slice_tags(text: str) -> str:
+    """A YAML file's text whose slices of Python, as Isaac Lab writes them, are plain lists."""
+    return text.replace(_SLICE, "")
 
 
 def is_deploy(content: Mapping[str, Any]) -> bool:
@@ -114,7 +120,7 @@ def _action(reader: MappingReader) -> dict[str, Any]:
     actions = reader.part("actions")
     actions.check_keys((_ACTION,))
     action = actions.part(_ACTION)
-    if action.content.get("joint_ids") is not None:
+    if action.content.get("joint_ids") not in (None, [None, None, None]):  # a slice of all
         raise action.wrong("joint_ids", action.content["joint_ids"], "null: all joints")
     found = {"action_scale": action.content.get("scale")}
     if action.content.get("offset") is not None:

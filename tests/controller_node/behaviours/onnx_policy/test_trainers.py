@@ -155,3 +155,23 @@ def test_a_malformed_deploy_file_is_one_line(
 ) -> None:
     with pytest.raises(ConfigurationError, match=said):
         read(tmp_path, {}, DEPLOY | given)
+
+
+def test_a_deploy_file_with_a_slice_of_all_joints_is_read(tmp_path: Path) -> None:
+    """As unitree_rl_lab has it for a policy of all joints (G1, 29 joints, velocity/v0)."""
+    plain = read(tmp_path, {}, DEPLOY | MOTORS)
+    file = tmp_path / "policy.yaml"
+    slice_of_all = "joint_ids: !!python/object/apply:builtins.slice [null, null, null]"
+    text = file.read_text("utf-8")
+    assert "joint_ids: null" in text
+    file.write_text(text.replace("joint_ids: null", slice_of_all), "utf-8")
+
+    again = read_description(Network(tmp_path / "policy.onnx"))
+
+    assert again.joints == plain.joints
+    assert again.action_offset.tolist() == plain.action_offset.tolist()
+    file.write_text(
+        text.replace("joint_ids: null", slice_of_all.replace("null,", "1,", 1)), "utf-8"
+    )
+    with pytest.raises(ConfigurationError, match="joint_ids is a list; it must be null"):
+        read_description(Network(tmp_path / "policy.onnx"))
