@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import dask
 from distributed import Client, KilledWorker, LocalCluster, Security
+from distributed.comm.core import CommClosedError
 
 from actuated_characters.runs.held_signals import signals_held
 from msgs_config.errors import ConfigurationError, RunError
@@ -20,6 +21,8 @@ from msgs_config.versions import engine_versions
 
 T = TypeVar("T")
 Item = TypeVar("Item")
+LOST = (CancelledError, CommClosedError)
+"""What Dask raises where a scheduler is there no more."""
 WORKERS_DIED = "each worker that was at it died"
 _PACKAGE = "actuated_characters"
 _PATIENCE = 10.0  # s until a scheduler must have answered
@@ -158,7 +161,7 @@ def results_in_order(
             yield future.result()
         except KilledWorker as error:
             raise RunError(WORKERS_DIED) from error
-        except CancelledError as error:
+        except LOST as error:
             raise lost() from error
 
 

@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from distributed import Client, Future, KilledWorker, as_completed, get_worker
 
-from actuated_characters.cluster import WORKERS_DIED, lost
+from actuated_characters.cluster import LOST, WORKERS_DIED, lost
 from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute
 from actuated_characters.sweep.work import Answer
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
@@ -81,10 +81,13 @@ class DaskWorkers:
             asked = self._asked.pop(str(future.key))
             if future.status not in ("finished", "error"):
                 raise lost()
-            error = future.exception()
-            if error is not None:
-                return Answer(asked.task, asked.is_repeat, None, failure=_failure(asked, error))
-            outcome, by, address = future.result()
+            try:
+                error = future.exception()
+                if error is not None:
+                    return Answer(asked.task, asked.is_repeat, None, failure=_failure(asked, error))
+                outcome, by, address = future.result()
+            except LOST as closed:
+                raise lost() from closed
             # Dask lets a worker that is idle take what is meant for others.
             if address == asked.not_by and asked.tries < _MOST_TRIES and self._others(address):
                 self._submit(replace(asked, tries=asked.tries + 1))

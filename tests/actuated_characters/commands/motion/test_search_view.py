@@ -38,7 +38,8 @@ def free_port() -> int:
 
 def children_of(pid: int) -> list[int]:
     """The processes that a process has begun, but for Python's tracker of what they share."""
-    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    text = " ".join((thread / "children").read_text() for thread in threads)
     return [
         int(child)
         for child in text.split()
