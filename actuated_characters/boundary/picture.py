@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -19,7 +19,6 @@ _MOST_PANELS, _PANELS_IN_ROW = 24, 4
 _PANEL = 3.0  # inches
 _HOLDS, _ALL_HOLD, _HOLE, _FAILED = "tab:green", "tab:olive", "tab:blue", "tab:red"
 _WIDEST = math.radians(30.0)  # of a bar
-_Panels: TypeAlias = Sequence[tuple[str, Sequence[Point]]]
 
 
 def draw(found: Survey, file: Path) -> bool:

@@ -13,9 +13,9 @@ from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
 from actuated_characters.commands.common.row_workers import (
     add_row_workers,
-    check_row_workers,
     results_directory,
     row_workers,
+    worker_count,
 )
 from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table, show
@@ -63,7 +63,7 @@ def _search(options: argparse.Namespace) -> int:
     from actuated_characters.sweep.work import check_rows
     from msgs_config.versions import engine_versions
 
-    check_row_workers(options)
+    worker_count(options)  # a wrong one is said before anything else
     search = read_search(options.file, row_options(), FIGURES)
     found = Survey(search)
     ends = [

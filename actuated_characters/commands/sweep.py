@@ -10,9 +10,9 @@ from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
 from actuated_characters.commands.common.row_workers import (
     add_row_workers,
-    check_row_workers,
     results_directory,
     row_workers,
+    worker_count,
 )
 from actuated_characters.commands.common.settings import Commands, add_command
 from msgs_config.errors import ConfigurationError
@@ -65,7 +65,7 @@ def _sweep(options: argparse.Namespace) -> int:
 
     if not 0.0 <= options.verify <= 1.0:
         raise ConfigurationError(f"--verify is {options.verify:g}; it must be a share from 0 to 1")
-    check_row_workers(options)
+    worker_count(options)  # a wrong one is said before anything else
     sweep = read_sweep(options.file, row_options(), FIGURES)
     rows = sweep.rows()
     for warning in check_rows(

@@ -1,7 +1,6 @@
 """The command `actuated_characters trial`: anybody's controller put through a set of trials."""
 
 import argparse
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
+from actuated_characters.commands.common.row_workers import scratch_folder, worker_count
 from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.common.tables import make_table
 from msgs_config.errors import ConfigurationError
@@ -28,7 +28,6 @@ if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.trial.trial_set import TrialSet
 
 _FOLDER = Path("trials")
-_SCRATCH = ".workers"  # in the results' directory: what runs write meanwhile
 _FILMS = 5
 _LAST_LINES = 3  # are told of a build that failed
 
@@ -79,13 +78,6 @@ def add_workers(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--workers", type=int, metavar="N", help="runs at once (as many as there are processors)"
     )
-
-
-def worker_count(options: argparse.Namespace) -> int:
-    """How many runs are made at once; raises ConfigurationError if that is none."""
-    if options.workers is not None and options.workers < 1:
-        raise ConfigurationError(f"--workers is {options.workers}; it must be 1 or more")
-    return options.workers or len(os.sched_getaffinity(0))
 
 
 def _trial(options: argparse.Namespace) -> int:
@@ -178,14 +170,8 @@ def trial_workers(trial: "Trial", count: int, directory: Path) -> "Iterator[Runs
     """So many runs at once, whose files go into a directory meanwhile."""
     from actuated_characters.trial.runs_at_once import runs_at_once
 
-    scratch = directory / _SCRATCH
-    shutil.rmtree(scratch, ignore_errors=True)  # of a trial that was killed
-    scratch.mkdir()
-    try:
-        with runs_at_once(trial, count, scratch) as workers:
-            yield workers
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+    with scratch_folder(directory) as scratch, runs_at_once(trial, count, scratch) as workers:
+        yield workers
 
 
 def _work(

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import progress_bar, say
+from actuated_characters.commands.common.row_workers import worker_count
 from actuated_characters.commands.common.settings import Commands, add_command
 from actuated_characters.commands.trial import (
     add_workers,
     build,
     check_trials,
     trial_workers,
-    worker_count,
 )
 from msgs_config.errors import ConfigurationError, RunError
 from msgs_config.runtime.extras import require_extra

@@ -15,7 +15,7 @@ from msgs_config.errors import ConfigurationError
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.sweep.work import Workers
 
-_SCRATCH = ".workers"  # in the results' directory: what workers write meanwhile
+_SCRATCH = ".workers"
 
 
 def add_row_workers(command: argparse.ArgumentParser, folder: Path) -> None:
@@ -38,16 +38,29 @@ def add_row_workers(command: argparse.ArgumentParser, folder: Path) -> None:
     )
 
 
-def check_row_workers(options: argparse.Namespace) -> None:
-    """Raise ConfigurationError if there cannot be so many workers."""
+def worker_count(options: argparse.Namespace) -> int:
+    """How many processes are asked for; raises ConfigurationError if that is none."""
     if options.workers is not None and options.workers < 1:
         raise ConfigurationError(f"--workers is {options.workers}; it must be 1 or more")
+    return options.workers or len(os.sched_getaffinity(0))
 
 
 def results_directory(options: argparse.Namespace, folder: Path) -> Path:
     """Where the results go."""
     directory: Path = options.output or folder / options.file.stem
     return directory.absolute()
+
+
+@contextmanager
+def scratch_folder(directory: Path) -> Iterator[Path]:
+    """A folder in that of the results, for what workers write meanwhile; it is gone in the end."""
+    scratch = directory / _SCRATCH
+    shutil.rmtree(scratch, ignore_errors=True)  # of a command that was killed
+    scratch.mkdir()
+    try:
+        yield scratch
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 @contextmanager
@@ -68,12 +81,8 @@ def row_workers(options: argparse.Namespace, directory: Path) -> "Iterator[Worke
                 say("no worker has joined yet; it waits for the first one")
             yield DaskWorkers(client, asked_run)
         return
-    scratch = directory / _SCRATCH
-    shutil.rmtree(scratch, ignore_errors=True)  # of a command that was killed
-    scratch.mkdir()
-    try:
-        count = options.workers or len(os.sched_getaffinity(0))
-        with local_cluster(count, scratch) as client:
-            yield DaskWorkers(client, asked_run)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+    with (
+        scratch_folder(directory) as scratch,
+        local_cluster(worker_count(options), scratch) as client,
+    ):
+        yield DaskWorkers(client, asked_run)
