@@ -12,10 +12,11 @@ from actuated_characters.fork.plan import ForkInputs, ForkPlan, plan_fork
 from actuated_characters.metrics.falls import FALLEN_TIME
 from actuated_characters.metrics.recording_metrics import fall_time
 from actuated_characters.runs.in_process import Progress
+from actuated_characters.runs.until_fall import Keyframe
 from actuated_characters.shrink.inputs import STEER, Event, Input, without_needless_stops
 from actuated_characters.shrink.minimal import Sizes, shrunk
 from actuated_characters.shrink.reading import read_inputs
-from actuated_characters.shrink.trial import Keyframe, TrialSetting, run_trial, script_of
+from actuated_characters.shrink.trial import TrialSetting, run_trial, script_of
 from msgs_config.errors import ConfigurationError, RefusedError, SimulationError
 
 LATER = 1.0
@@ -146,16 +147,17 @@ class Trials:
             self.report(self)
             self._fell[key] = False  # unless the trial, which may raise an error, says otherwise
             begin = None if compared >= 0 else self._latest_keyframe(events)
-            outcome = run_trial(self.setting, events, begin, compared=compared)
-            self._fell[key] = outcome.fell
-            self._keep(events, outcome.keyframes)
+            ended = run_trial(self.setting, events, begin, compared=compared)
+            self._fell[key] = ended.fell is True
+            self._keep(events, ended.keyframes)
         if self._fell[key] and (self.best is None or _cost(sizes) < _cost(self.best)):
             self.best = dict(sizes)
         return self._fell[key]
 
     def _keep(self, events: Sequence[Event], keyframes: Sequence[Keyframe]) -> None:
         for each in keyframes:
-            self._keyframes[each.row, _before(events, each.row)] = each
+            row = self.setting.row_of(each)
+            self._keyframes[row, _before(events, row)] = each
         excess = sum(each.size for each in self._keyframes.values()) - _MOST_BYTES
         while excess > 0:
             excess -= self._keyframes.pop(next(iter(self._keyframes))).size

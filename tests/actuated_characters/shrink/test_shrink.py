@@ -11,11 +11,12 @@ from actuated_characters.bags.recording import read_recording
 from actuated_characters.cli import main
 from actuated_characters.commands.common import interruption
 from actuated_characters.replay.replay import replay
+from actuated_characters.runs.until_fall import Ended, Keyframe
 from actuated_characters.shrink import shrinking as shrinking_module
 from actuated_characters.shrink.inputs import Event, Setting
 from actuated_characters.shrink.minimal import SHARE
 from actuated_characters.shrink.shrinking import Shrinking, Trials, plan_shrinking
-from actuated_characters.shrink.trial import Keyframe, Outcome, TrialSetting, run_trial
+from actuated_characters.shrink.trial import TrialSetting, run_trial
 from msgs_config.errors import ReplayError
 from msgs_config.messages.keyframe import decode_keyframe
 from sim_node.interface.keyframes import read_memory
@@ -112,13 +113,13 @@ def test_a_trial_from_a_keyframe_is_the_whole_one_to_the_bit(
     assert any(isinstance(event.content, Setting) for event in events)
 
     whole = run_trial(setting, events, None)
-    rows = [each.row for each in whole.keyframes]
+    rows = [setting.row_of(each) for each in whole.keyframes]
     assert rows[:2] == [120, 180]  # a quarter of a second apart; none while a push acts
     again = run_trial(setting, events, whole.keyframes[1])
 
     assert again.fell == whole.fell
     last, same = whole.keyframes[-1], again.keyframes[-1]
-    assert last.row == same.row > 240
+    assert last.tick == same.tick > 240
     assert state_in(last, setting) == state_in(same, setting)
 
 
@@ -135,7 +136,7 @@ def test_trials_from_the_start_of_a_fork_begin_with_its_keyframe(tmp_path: Path)
     run_trial(setting, events, first.keyframes[-1])
     again = run_trial(setting, events, None)
 
-    assert [each.row for each in first.keyframes] == [each.row for each in again.keyframes]
+    assert [each.tick for each in first.keyframes] == [each.tick for each in again.keyframes]
     assert state_in(first.keyframes[0], setting) == state_in(again.keyframes[0], setting)
 
 
@@ -145,7 +146,7 @@ def test_a_recording_that_is_not_repeated_leaves_nothing(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def other(*given: object, **named: object) -> Outcome:
+    def other(*given: object, **named: object) -> Ended:
         raise ReplayError("tick 3 differs")
 
     monkeypatch.setattr(shrinking_module, "run_trial", other)
@@ -165,7 +166,7 @@ def test_an_interruption_keeps_the_best_so_far(
 
     def interrupted(
         setting: object, events: Sequence[Event], *given: object, **named: object
-    ) -> Outcome:
+    ) -> Ended:
         trials.append(events)
         if len(trials) == 2:
             signal.raise_signal(signal.SIGINT)
