@@ -5,7 +5,7 @@ a search that was interrupted finds its runs in the journal again.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from actuated_characters.boundary.bisection import (
@@ -15,7 +15,7 @@ from actuated_characters.boundary.bisection import (
     most_tries,
     values_to_try,
 )
-from actuated_characters.boundary.file import Search
+from actuated_characters.boundary.file import FELL, Search
 from actuated_characters.sweep.grid import Cell, Row
 from actuated_characters.sweep.journal import Done, Journal
 from actuated_characters.sweep.work import Job, Report, Workers, is_done, work
@@ -67,19 +67,34 @@ class Survey:
 
     def most_rows(self) -> int:
         """How many runs there will be at most."""
-        return len(self.points) * most_tries(self.search.way)
+        return len(self.points) * (most_tries(self.search.way) + 1)
 
     def boundary(self, point: Point) -> Boundary:
         """What is known of a point's boundary."""
         return find_boundary(self.search.way, point.tried)
 
-    def ends(self) -> list[Row]:
-        """The run at the end of each point's way, whose bag is kept."""
-        return [
-            point.end(self.boundary(point))
-            for point in self.points
-            if point.tried and not point.error
-        ]
+    def shown(self) -> dict[int, tuple[Row, Row]]:
+        """By point: the run at the end of its way, and the same that is made whole, as a new row.
+
+        These are known when there are no more rounds.
+        """
+        known = [point for point in self.points if point.tried and not point.error]
+        ends = [point.end(self.boundary(point)) for point in known]
+        numbers = range(len(self.rows) + 1, len(self.rows) + 1 + len(ends))
+        return {
+            point.number: (end, replace(end, number=number))
+            for point, end, number in zip(known, ends, numbers, strict=True)
+        }
+
+    def all_rows(self) -> list[Row]:
+        """Those that were tried, and those that were made whole."""
+        return [*self.rows, *(row for _, row in self.shown().values())]
+
+    def differences(self, done: Mapping[int, Done]) -> list[str]:
+        """A line for each run that became something else when it was made once more."""
+        pairs = [(end, row) for end, row in self.shown().values() if row.number in done]
+        lines = [_difference(done[end.number], done[row.number]) for end, row in pairs]
+        return list(filter(None, lines))
 
     def _learn(self, point: Point, done: Mapping[int, Done]) -> None:
         for value, row in point.rows.items():
@@ -104,26 +119,45 @@ def survey(
         RunError: no more answers will come, or the journal cannot be written.
     """
     while rows := found.advance(journal.done):
-        report = work(Job(rows, directory), workers, journal, progress)
+        job = Job(rows, directory, until_fall=found.search.figure == FELL)
+        report = work(job, workers, journal, progress)
         if report.undone:
             return report  # the numbers of all later runs depend on it
     return Report()
 
 
-def keep_ends(found: Survey, directory: Path, workers: Workers, journal: Journal) -> Report:
-    """Have those at the boundaries done once more, and their bags kept, if the search asks for it.
+def show_ends(
+    found: Survey,
+    directory: Path,
+    workers: Workers,
+    journal: Journal,
+    progress: Callable[[], object] = lambda: None,
+) -> Report:
+    """Have those at the boundaries made once more, whole and with bags if these are asked for.
 
     Raises:
         RunError: as `survey`, or a bag cannot be written.
     """
-    return work(_to_keep(found, directory), workers, journal)
+    return work(_whole(found, directory), workers, journal, progress)
 
 
 def is_over(found: Survey, directory: Path, journal: Journal) -> bool:
     """Whether there is nothing left to do."""
-    return not found.advance(journal.done) and is_done(_to_keep(found, directory), journal)
+    return not found.advance(journal.done) and is_done(_whole(found, directory), journal)
 
 
-def _to_keep(found: Survey, directory: Path) -> Job:
-    rows = found.ends() if found.search.bags == "all" else []
-    return Job(rows, directory, bags="all", verified=1.0, keeps_repeats=True)
+def _whole(found: Survey, directory: Path) -> Job:
+    return Job([row for _, row in found.shown().values()], directory, found.search.bags)
+
+
+def _difference(tried: Done, whole: Done) -> str:
+    """The first thing that one of two runs says otherwise than the other; empty: nothing."""
+    first, second = tried.outcome, whole.outcome
+    both = [(name, first.figures.get(name), second.figures.get(name)) for name in first.figures]
+    both = [*both, ("error", first.error or None, second.error or None)]
+    said = (
+        f"{name} of row {whole.number} is {other}, of row {tried.number}, the same run, {one}"
+        for name, one, other in both
+        if one != other
+    )
+    return next(said, "")

@@ -15,10 +15,12 @@ BOUNDARY = "boundary.csv"
 def boundary_records(found: Survey, done: Mapping[int, Done]) -> list[Record]:
     """What is known of each point that was begun: its boundary, and the run whose bag shows it."""
     records: list[Record] = []
+    shown = found.shown()
     for point in found.points:
         if not point.tried:
             continue
-        boundary, row = found.boundary(point), point.end(found.boundary(point))
+        boundary = found.boundary(point)
+        whole = done.get(shown[point.number][1].number) if point.number in shown else None
         records.append(
             {
                 "point": point.number,
@@ -27,9 +29,9 @@ def boundary_records(found: Survey, done: Mapping[int, Done]) -> list[Record]:
                 "fails": boundary.fails,
                 "holes": " ".join(map(cell_text, boundary.holes)) or None,
                 "tries": len(point.tried),
-                "row": row.number,
-                "state_hash": done[row.number].outcome.state_hash or None,
-                "error": point.error or done[row.number].outcome.error or None,
+                "row": whole.number if whole else None,
+                "state_hash": (whole.outcome.state_hash or None) if whole else None,
+                "error": point.error or (whole and whole.outcome.error) or None,
             }
         )
     return records

@@ -95,7 +95,7 @@ def _work(
     options: argparse.Namespace, found: "Survey", directory: Path, journal: "Journal"
 ) -> "Report":
     """Have the runs done; shows the progress."""
-    from actuated_characters.boundary.survey import is_over, keep_ends, survey
+    from actuated_characters.boundary.survey import is_over, show_ends, survey
     from actuated_characters.sweep.work import Report
 
     if is_over(found, directory, journal):
@@ -111,9 +111,13 @@ def _work(
 
         progress()
         report = survey(found, directory, workers, journal, progress)
-        bar.update(bar.task_ids[0], total=len(journal.done), state="")  # it may have been fewer
-        _write(found, directory, journal)  # what was found is there if bags cannot be kept
-        return report if report.undone else keep_ends(found, directory, workers, journal)
+        if not report.undone:
+            bar.update(bar.task_ids[0], total=len(found.all_rows()))  # it may have been fewer
+            _write(found, directory, journal)  # what was found is there if bags cannot be kept
+            report = show_ends(found, directory, workers, journal, progress)
+        bar.update(bar.task_ids[0], total=len(journal.done), state="")
+        _write(found, directory, journal)
+        return report
 
 
 def _write(found: "Survey", directory: Path, journal: "Journal") -> None:
@@ -122,7 +126,7 @@ def _write(found: "Survey", directory: Path, journal: "Journal") -> None:
     from actuated_characters.boundary.table import write_boundary
     from actuated_characters.sweep.table import make_records, write_tables
 
-    write_tables(directory, make_records(found.rows, journal.done))
+    write_tables(directory, make_records(found.all_rows(), journal.done))
     write_boundary(directory, found, journal.done)
     draw(found, directory / PICTURE)
 
@@ -143,8 +147,7 @@ def _conclude(found: "Survey", directory: Path, journal: "Journal", report: "Rep
     if found.search.bags == "all" and not report.undone:
         print(f"a bag of each point: {directory / 'rows'}")
     errors += [f"point {each.number}: {each.error}" for each in found.points if each.error]
-    different = [each for each in journal.verified.values() if each.difference]
-    errors += [f"row {each.number} differs: {each.difference}" for each in different]
+    errors += found.differences(journal.done)
     for line in errors:
         print(f"error: {line}", file=sys.stderr)
     return int(bool(errors))
@@ -162,7 +165,7 @@ def _print_summary(found: "Survey") -> None:
     """Say how many runs there were, and what is not as one would think."""
     boundaries = [found.boundary(point) for point in found.points if not point.error]
     failure = found.search.describe_failure()
-    print(f"{len(found.rows)} runs, {len(boundaries)} points; a run has failed if {failure}")
+    print(f"{len(found.all_rows())} runs, {len(boundaries)} points; a run has failed if {failure}")
     for count, what in (
         (sum(each.fails is None for each in boundaries), "held all along the way"),
         (sum(each.holds is None for each in boundaries), "failed from the first value on"),

@@ -71,7 +71,7 @@ def run_over_topics(
     recording = {**recording, **about}
     # messages of other nodes in the domain are of another session, and each process rejects them
     session = ("-p", f"{SESSION.name}:={make_session('/sim_node')}")
-    senders = plan_senders(directory, inputs, recording, fork, is_foreign=foreign is not None)
+    senders = plan_senders(directory, inputs, recording, fork, simulator_waits=foreign is not None)
     with run_environment(directory) as environment, Children(directory, environment) as children:
         if viewer is not None:
             progress = watch(children.start_node("viewer", viewer), progress)

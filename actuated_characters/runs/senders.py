@@ -16,16 +16,16 @@ def plan_senders(
     recording: Mapping[str, object],
     fork: Mapping[str, object] | None,
     *,
-    is_foreign: bool = False,
+    simulator_waits: bool = False,
 ) -> dict[str, dict[str, object]]:
     """The parameters of the node that sends what was planned, by its name; none if nothing was.
 
-    A foreign controller may answer at once, so that the simulator is the one that waits for it.
+    The controller waits for it; else the simulator, as where a foreign one may answer at once.
     """
     if not any(inputs.by_name().values()) and fork is None:
         return {}
     planned = _write_planned(directory, inputs, recording)
-    if is_foreign:
+    if simulator_waits:
         planned["heard_by"] = JOINT_STATES.name
     return {"pusher": planned} if fork is None else {"fork": {**planned, **fork}}
 

@@ -14,6 +14,7 @@ from distributed import Client, Future, KilledWorker, as_completed, get_worker
 
 from actuated_characters.cluster import LOST, WORKERS_DIED, lost
 from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute
+from actuated_characters.sweep.until_fall import run_row_until_fall
 from actuated_characters.sweep.work import Answer
 from msgs_config.errors import ActuatedCharactersError, ConfigurationError, RunError
 from msgs_config.versions import engine_versions
@@ -128,5 +129,6 @@ def _work(task: RowTask, ask: Ask, versions: Mapping[str, str]) -> "_Result":
     if others:
         raise ConfigurationError(f"{by} has {', '.join(others)}; install the same there")
     with _one_at_a_time:
-        outcome = compute(task, ask, Path(worker.local_directory))
+        run = run_row_until_fall if task.until_fall else None
+        outcome = compute(task, ask, Path(worker.local_directory), run)
     return outcome, by, worker.address

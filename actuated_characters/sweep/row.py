@@ -6,6 +6,7 @@ import socket
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -56,6 +57,7 @@ class RowTask:
     arguments: tuple[str, ...]
     bags: str  # whether its bag is kept: `none`, `failures` or `all`
     results: Path  # of the sweep
+    until_fall: bool = False  # whether it ends when its character fell, which is all it says
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def compute(
     """
     with tempfile.TemporaryDirectory(prefix="row-", dir=scratch) as folder:
         directory = Path(folder) / _RUN
-        outcome = (run or _outcome)(task, ask, directory)
+        outcome = (run or partial(run_row, run=_run_whole))(task, ask, directory)
         if task.bags == "all" or (task.bags == "failures" and outcome.has_failed):
             _keep(directory, row_directory(task.results, task.number))
         return outcome
@@ -116,24 +118,35 @@ def with_one_thread(arguments: Sequence[str]) -> list[str]:
     return [*arguments, f"--set={_THREADS}:=1"]
 
 
-def _outcome(task: RowTask, ask: Ask, directory: Path) -> Outcome:
+def run_row(
+    task: RowTask, ask: Ask, directory: Path, run: Callable[[AskedRun, RowTask, Path], Outcome]
+) -> Outcome:
+    """Run a row; its outcome, also if there is no such run, or it fails.
+
+    Raises:
+        RecordingError: the files cannot be written.
+    """
     try:
         asked = ask(with_one_thread(task.arguments))
     except ActuatedCharactersError as error:
         return replace(failed(error, directory), is_refused=True)
     try:
         prepare_directory(directory, overwrite=False)
-        run_in_process(
-            asked.plan,
-            directory,
-            write_bag=task.bags != "none",
-            recording=asked.recording,
-            inputs=asked.inputs,
-        )
+        return run(asked, task, directory)
     except RecordingError:
         raise  # the disk is full, or the like: not what becomes of the row anywhere
     except ActuatedCharactersError as error:
         return failed(error, directory)
+
+
+def _run_whole(asked: AskedRun, task: RowTask, directory: Path) -> Outcome:
+    run_in_process(
+        asked.plan,
+        directory,
+        write_bag=task.bags != "none",
+        recording=asked.recording,
+        inputs=asked.inputs,
+    )
     summary, series = read_metrics(directory)
     has_reference = bool(np.isfinite(series["joint_error_mean_rad"]).any())
     verdict = describe_end(

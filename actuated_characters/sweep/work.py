@@ -57,13 +57,13 @@ class Job:
     bags: str = "none"  # which are kept: `none`, `failures` or `all`
     seed: int = 0  # of which rows are computed twice
     verified: float = 0.0  # share of the rows that are computed twice
-    keeps_repeats: bool = False  # whether bags of the second time are kept likewise
+    until_fall: bool = False  # whether each ends when its character fell
 
     def task(self, row: Row, *, is_repeat: bool = False) -> RowTask:
         """What a worker is told of a row."""
         arguments = tuple(map(_with_whole_path, row.arguments))
-        bags = "none" if is_repeat and not self.keeps_repeats else self.bags
-        return RowTask(row.number, arguments, bags, self.directory)
+        bags = "none" if is_repeat else self.bags
+        return RowTask(row.number, arguments, bags, self.directory, self.until_fall)
 
     def to_verify(self) -> frozenset[int]:
         """Numbers of the rows that are computed twice: at least one, if any share is asked for."""

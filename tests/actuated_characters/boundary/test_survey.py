@@ -3,13 +3,14 @@
 import random
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from actuated_characters.boundary.file import read_search
 from actuated_characters.boundary.picture import PICTURE, draw
-from actuated_characters.boundary.survey import Survey, is_over, keep_ends, survey
+from actuated_characters.boundary.survey import Survey, is_over, show_ends, survey
 from actuated_characters.boundary.table import boundary_records
 from actuated_characters.sweep.grid import Cell
 from actuated_characters.sweep.journal import Done, Journal
@@ -30,31 +31,34 @@ class Here:
     """Workers for which a character falls by the side's edge, answering in any order."""
 
     def __init__(self, seed: int, most: int = 999) -> None:
-        self.tasks: list[tuple[RowTask, bool]] = []
-        self.asked: list[tuple[RowTask, bool]] = []
+        self.tasks: list[RowTask] = []
+        self.asked: list[RowTask] = []
         self._random, self._most = random.Random(seed), most
 
     def size(self) -> int:
         return 5
 
     def submit(self, task: RowTask) -> None:
-        self.tasks.append((task, False))
+        self.tasks.append(task)
 
     def repeat(self, task: RowTask, address: str) -> None:
-        self.tasks.append((task, True))
+        raise AssertionError("nobody asked for it")
 
     def wait(self) -> Answer:
         if not self._most:
             raise RunError("the scheduler is gone")
         self._most -= 1
-        task, is_repeat = self.tasks.pop(self._random.randrange(len(self.tasks)))
-        self.asked.append((task, is_repeat))
+        task = self.tasks.pop(self._random.randrange(len(self.tasks)))
+        self.asked.append(task)
         found = re.fullmatch(
             r"--push=impulse=(\d+) from=(\d+) at=1 target=chest", task.arguments[0]
         )
         assert found is not None
         impulse, side = map(int, found.groups())
-        return Answer(task, is_repeat, self.outcome(impulse, side), "a", "tcp://a")
+        outcome = self.outcome(impulse, side)
+        if task.until_fall:
+            outcome = replace(outcome, state_hash="")
+        return Answer(task, False, outcome, "a", "tcp://a")
 
     def outcome(self, impulse: int, side: int) -> Outcome:
         figures: Mapping[str, Cell] = {"fell": impulse >= EDGES[side]}
@@ -72,8 +76,8 @@ def searched(folder: Path, workers: Here, name: str) -> tuple[Survey, Mapping[in
     with Journal(folder / name, {}) as journal:
         report = survey(found, folder / name, workers, journal)
         assert report.undone == []
-        assert keep_ends(found, folder / name, workers, journal).undone == []
-        assert not any(each.difference for each in journal.verified.values())
+        assert show_ends(found, folder / name, workers, journal).undone == []
+        assert found.differences(journal.done) == []
         return found, dict(journal.done)
 
 
@@ -87,7 +91,7 @@ def test_each_points_boundary_is_found(tmp_path: Path) -> None:
         (180, 40, None),
     ]
     assert [each["state_hash"] for each in records] == ["7 0", "33 90", "40 180"]
-    assert len(done) == len(found.rows) <= found.most_rows()
+    assert len(done) == len(found.all_rows()) <= found.most_rows()
 
 
 def test_runs_are_the_same_in_whatever_order_they_are_answered(tmp_path: Path) -> None:
@@ -97,14 +101,48 @@ def test_runs_are_the_same_in_whatever_order_they_are_answered(tmp_path: Path) -
     assert first.rows == second.rows
 
 
-def test_the_runs_at_the_boundary_are_made_once_more_with_their_bags(tmp_path: Path) -> None:
+def test_the_runs_at_the_boundary_are_made_once_more_whole_with_their_bags(tmp_path: Path) -> None:
     workers = Here(3)
     found, done = searched(tmp_path, workers, "results")
 
-    kept = sorted(task.number for task, is_repeat in workers.asked if is_repeat)
-    assert kept == sorted(int(str(each["row"])) for each in boundary_records(found, done))
-    assert {task.bags for task, is_repeat in workers.asked if is_repeat} == {"all"}
-    assert {task.bags for task, is_repeat in workers.asked if not is_repeat} == {"none"}
+    tried, whole = workers.asked[: len(found.rows)], workers.asked[len(found.rows) :]
+    numbers = sorted(task.number for task in whole)
+    assert numbers == [each["row"] for each in boundary_records(found, done)]
+    assert {(task.bags, task.until_fall) for task in tried} == {("none", True)}
+    assert {(task.bags, task.until_fall) for task in whole} == {("all", False)}
+
+
+def test_what_is_another_run_when_it_is_made_whole_is_told(tmp_path: Path) -> None:
+    class Twice(Here):
+        def wait(self) -> Answer:
+            answer = super().wait()
+            if answer.task.until_fall or "from=90" not in answer.task.arguments[0]:
+                return answer
+            return replace(answer, outcome=Outcome({"fell": False}, "", "other"))
+
+    found = started(tmp_path)
+    with Journal(tmp_path / "out", {}) as journal:
+        survey(found, tmp_path, Twice(1), journal)
+        show_ends(found, tmp_path, Twice(1), journal)
+        (line,) = found.differences(journal.done)
+
+    assert re.fullmatch(r"fell of row \d+ is False, of row \d+, the same run, True", line)
+
+
+def test_runs_that_fail_by_a_figure_are_whole(tmp_path: Path) -> None:
+    class Measuring(Here):
+        def outcome(self, impulse: int, side: int) -> Outcome:
+            return Outcome({"root_error_max_m": impulse / 100}, "", f"{impulse} {side}")
+
+    file = tmp_path / "search.yaml"
+    file.write_text(FILE.replace("around: side}", "fails: {root_error_max_m: 0.2}}"))
+    found, workers = Survey(read_search(file, OPTIONS, ("root_error_max_m",))), Measuring(1)
+    with Journal(tmp_path / "out", {}) as journal:
+        survey(found, tmp_path / "out", workers, journal)
+        records = boundary_records(found, journal.done)
+
+    assert [(each["holds"], each["fails"]) for each in records] == [(20, 21)] * 3
+    assert not any(task.until_fall for task in workers.asked)
 
 
 @pytest.mark.parametrize("most", [3, 14, 22])
@@ -114,7 +152,7 @@ def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path, most: int) -
         assert not is_over(started(tmp_path), tmp_path, journal)
         cut, workers = started(tmp_path), Here(4, most)
         survey(cut, tmp_path / "cut", workers, journal)
-        keep_ends(cut, tmp_path / "cut", workers, journal)
+        show_ends(cut, tmp_path / "cut", workers, journal)
     workers = Here(5)
 
     again, _ = searched(tmp_path, workers, "cut")
@@ -153,16 +191,16 @@ def test_a_run_without_the_figure_is_an_error_of_its_point(tmp_path: Path) -> No
     assert len(found.rows) == len(found.points) * 5  # the even values alone
 
 
-def test_without_bags_nothing_is_made_twice(tmp_path: Path) -> None:
+def test_bags_are_kept_if_asked_for_alone(tmp_path: Path) -> None:
     (tmp_path / "search.yaml").write_text(FILE + "bags: none\n")
     found = Survey(read_search(tmp_path / "search.yaml", OPTIONS, ("fell",)))
     workers = Here(1)
     with Journal(tmp_path / "out", {}) as journal:
         survey(found, tmp_path / "out", workers, journal)
-        keep_ends(found, tmp_path / "out", workers, journal)
+        show_ends(found, tmp_path / "out", workers, journal)
         assert is_over(found, tmp_path / "out", journal)
 
-    assert len(workers.asked) == len(found.rows)
+    assert {task.bags for task in workers.asked} == {"none"}
 
 
 def test_a_run_that_diverges_has_failed(tmp_path: Path) -> None:
@@ -180,7 +218,7 @@ def test_a_row_that_nobody_could_do_ends_the_search_until_the_next_time(tmp_path
     class Dying(Here):
         def wait(self) -> Answer:
             answer = super().wait()
-            if answer.task.number != 4 or answer.is_repeat:
+            if answer.task.number != 4:
                 return answer
             return Answer(answer.task, False, None, failure="each worker that was at it died")
 
