@@ -13,7 +13,6 @@ from actuated_characters.fork.script import Script
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import (
     write_character,
-    write_keyframe,
     write_urdf,
 )
 from actuated_characters.runs.execution import run_over_topics
@@ -23,6 +22,7 @@ from actuated_characters.runs.planned.throw_hits import describe_hits, read_stat
 from msgs_config.character.loading import load_character
 from msgs_config.errors import ActuatedCharactersError
 from msgs_config.messages import topics
+from msgs_config.messages.keyframe import write_keyframe
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import CHARACTER, RESUME_FROM
 

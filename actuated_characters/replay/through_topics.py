@@ -11,7 +11,6 @@ from actuated_characters.replay.command_comparison import CommandComparison, com
 from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
 from actuated_characters.replay.players.character_files import (
     write_character,
-    write_keyframe,
     write_urdf,
 )
 from actuated_characters.replay.players.controller_parameters import first_parameters
@@ -30,6 +29,7 @@ from actuated_characters.replay.world import read_world, simulator_values
 from actuated_characters.runs.processes import Child, Children
 from msgs_config.errors import ConfigurationError, RecordingError, RunError
 from msgs_config.messages import topics
+from msgs_config.messages.keyframe import write_keyframe
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT, RESUME_FROM
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS

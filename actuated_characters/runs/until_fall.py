@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 
 from actuated_characters.metrics.collector import MetricsCollector
-from actuated_characters.replay.players.character_files import write_keyframe
 from actuated_characters.runs.held_signals import signals_held
 from actuated_characters.runs.in_process import run_made
 from actuated_characters.runs.plan import RunPlan
@@ -16,7 +15,7 @@ from msgs_config.bus.node import BusNode, Executor, StopFlag
 from msgs_config.errors import RunError
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK, TickClock
-from msgs_config.messages.keyframe import decode_keyframe
+from msgs_config.messages.keyframe import decode_keyframe, write_keyframe
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import KEYFRAME_BUDGET, KEYFRAME_PERIOD, RESUME_FROM
 

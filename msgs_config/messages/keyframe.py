@@ -56,3 +56,12 @@ def read_keyframe(path: str) -> Keyframe:
     except OSError as error:
         raise RecordingError(f"keyframe {path} cannot be read: {error.strerror}") from error
     return decode_keyframe(raw)
+
+
+def write_keyframe(directory: Path, node: str, raw: bytes | None) -> str:
+    """Write a node's keyframe; the file's path, as a parameter, empty where there is none."""
+    if raw is None:
+        return ""
+    file = directory / f"{node}.keyframe"
+    file.write_bytes(raw)
+    return str(file)

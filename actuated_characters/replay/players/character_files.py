@@ -45,15 +45,6 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
     return file
 
 
-def write_keyframe(directory: Path, node: str, raw: bytes | None) -> str:
-    """Write a node's keyframe; the file's path, as a parameter, empty where there is none."""
-    if raw is None:
-        return ""
-    file = directory / f"{node}.keyframe"
-    file.write_bytes(raw)
-    return str(file)
-
-
 def _content(character: Character) -> dict[str, Any]:
     """The content of the character's file, or what a URDF alone stands for."""
     if not character.file_text:

@@ -12,12 +12,14 @@ from actuated_characters.sweep.until_fall import run_row_until_fall
 pytestmark = [pytest.mark.slow, pytest.mark.sharing]
 
 STAND = (
-    *("--keyframes=humanoid_stand", "--duration=2.2", "--set=controller_node.root_assistance:=false"),
+    *("--keyframes=humanoid_stand", "--duration=2.2"),
+    "--set=controller_node.root_assistance:=false",
     "--set=controller_node.balance.enabled:=true",
 )
 SENT = (  # before and after the push
     *("--machine=walk", "--cmd-vel=0.9,0,0@0.2 0.5,0,0.2@1.1", "--duration=2.4"),
-    *("--throw=mass=0.3 speed=5 at=0.6 target=chest", "--throw=mass=0.5 speed=5 at=1.5 target=root"),
+    "--throw=mass=0.3 speed=5 at=0.6 target=chest",
+    "--throw=mass=0.5 speed=5 at=1.5 target=root",
 )
 POLICY = ("--clip=walk", "--planner=policy", "--duration=2.0")
 
