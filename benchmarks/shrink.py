@@ -6,6 +6,7 @@ and made 5 % smaller, in a whole run: it must not fall.
 """
 
 import argparse
+import os
 import tempfile
 import time
 from collections.abc import Sequence
@@ -25,14 +26,9 @@ from actuated_characters.runs.planned.velocities import plan_velocities
 from actuated_characters.runs.planned.wrenches import parse_push
 from actuated_characters.shrink.inputs import Event, Setting
 from actuated_characters.shrink.minimal import SHARE, Sizes
-from actuated_characters.shrink.shrinking import (
-    Shrinking,
-    Trials,
-    plan_shrinking,
-    run_shrunk,
-    shrink,
-)
+from actuated_characters.shrink.shrinking import Shrinking, plan_shrinking, run_shrunk
 from actuated_characters.shrink.trial import script_of
+from actuated_characters.shrink.trials import Trials, shrink
 from benchmarks.support.machine import describe_machine
 from benchmarks.support.printed import make_table
 from msgs_config.errors import ActuatedCharactersError, SimulationError
@@ -123,12 +119,13 @@ def _draw(plan: RunPlan, rng: np.random.Generator) -> Sequence[Event]:
 
 def _shrink(run: Path, folder: Path) -> list[str]:
     """Shrink a run; what the table says of it."""
-    wall, processor = time.monotonic(), time.process_time()
+    wall, processor = time.monotonic(), sum(os.times()[:4])
     shrinking = plan_shrinking(run)
     trials = Trials(shrinking, folder)
-    sizes = shrink(trials)
+    with trials.at_once(len(os.sched_getaffinity(0))):
+        sizes = shrink(trials)
     assert _falls(shrinking, sizes, folder / "shrunk")
-    wall, processor = time.monotonic() - wall, time.process_time() - processor
+    wall, processor = time.monotonic() - wall, sum(os.times()[:4]) - processor
     lines = [
         f"{line} ({100.0 * size:.3g} %)"
         for line, size in zip(shrinking.describe(sizes), _in_time(shrinking, sizes), strict=True)

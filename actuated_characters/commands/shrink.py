@@ -11,12 +11,14 @@ from rich.console import Console
 
 from actuated_characters.commands.common.interruption import check_interruption
 from actuated_characters.commands.common.progress import say
+from actuated_characters.commands.common.row_workers import add_workers, worker_count
 from actuated_characters.commands.common.settings import Commands, add_bag, add_command
 from msgs_config.errors import ConfigurationError, RunError
 
 if TYPE_CHECKING:  # it takes a second to import
     from actuated_characters.shrink.minimal import Sizes
-    from actuated_characters.shrink.shrinking import Shrinking, Trials
+    from actuated_characters.shrink.shrinking import Shrinking
+    from actuated_characters.shrink.trials import Trials
 
 
 def add_shrink(commands: "Commands[argparse.ArgumentParser]") -> None:
@@ -40,6 +42,7 @@ def add_shrink(commands: "Commands[argparse.ArgumentParser]") -> None:
         help="where the results go (RUN-shrunk, with a number if it exists)",
     )
     command.add_argument("--overwrite", action="store_true", help="replace the results in DIR")
+    add_workers(command)
 
 
 def _shrink(options: argparse.Namespace) -> None:
@@ -50,8 +53,10 @@ def _shrink(options: argparse.Namespace) -> None:
         prepare_directory,
         prepare_free_directory,
     )
-    from actuated_characters.shrink.shrinking import Trials, plan_shrinking
+    from actuated_characters.shrink.shrinking import plan_shrinking
+    from actuated_characters.shrink.trials import Trials
 
+    workers = worker_count(options)
     run = options.bag.absolute()
     run = run.parent if run.name == BAG else run
     directory = (options.output or run.with_name(f"{run.name}-shrunk")).absolute()
@@ -68,7 +73,7 @@ def _shrink(options: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         trials = Trials(shrinking, Path(folder))
         try:
-            sizes = _searched(trials)
+            sizes = _searched(trials, workers)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt) and trials.best is not None:
                 say("interrupted; the best so far, which may not be the least:")
@@ -81,9 +86,9 @@ def _shrink(options: argparse.Namespace) -> None:
     _write(shrinking, sizes, directory)
 
 
-def _searched(trials: "Trials") -> "Sizes":
+def _searched(trials: "Trials", workers: int) -> "Sizes":
     """Have the trials done; shows how far they are."""
-    from actuated_characters.shrink.shrinking import shrink
+    from actuated_characters.shrink.trials import shrink
 
     total = trials.shrinking.total
     with Console(stderr=True).status("") as status:
@@ -95,7 +100,8 @@ def _searched(trials: "Trials") -> "Sizes":
             status.update(f"trial {trials.count}: {left}")
 
         trials.report = report
-        return shrink(trials)
+        with trials.at_once(workers):
+            return shrink(trials)
 
 
 def _write(shrinking: "Shrinking", sizes: "Sizes", directory: Path) -> None:

@@ -28,13 +28,18 @@ def add_row_workers(command: argparse.ArgumentParser, folder: Path) -> None:
         "--again", action="store_true", help="forget the results in DIR, and begin again"
     )
     where = command.add_mutually_exclusive_group()
-    where.add_argument(
-        "--workers", type=int, metavar="N", help="processes (as many as there are processors)"
-    )
+    add_workers(where)
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",
         help="of any cluster of Dask, which computes the rows: tcp://HOST:PORT",
+    )
+
+
+def add_workers(command: argparse._ActionsContainer) -> None:
+    """Add how many processes compute runs."""
+    command.add_argument(
+        "--workers", type=int, metavar="N", help="processes (as many as there are processors)"
     )
 
 

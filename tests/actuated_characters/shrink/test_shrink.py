@@ -12,11 +12,12 @@ from actuated_characters.cli import main
 from actuated_characters.commands.common import interruption
 from actuated_characters.replay.replay import replay
 from actuated_characters.runs.until_fall import Ended, Keyframe
-from actuated_characters.shrink import shrinking as shrinking_module
+from actuated_characters.shrink import trials as trials_module
 from actuated_characters.shrink.inputs import Event, Setting
 from actuated_characters.shrink.minimal import SHARE
-from actuated_characters.shrink.shrinking import Shrinking, Trials, plan_shrinking
+from actuated_characters.shrink.shrinking import Shrinking, plan_shrinking
 from actuated_characters.shrink.trial import TrialSetting, run_trial
+from actuated_characters.shrink.trials import Trials
 from msgs_config.errors import ReplayError
 from msgs_config.messages.keyframe import decode_keyframe
 from sim_node.interface.keyframes import read_memory
@@ -95,6 +96,20 @@ def test_what_is_left_falls_and_less_of_it_does_not(
     assert duration == pytest.approx(float(summary_of(fallen)["fell_at_s"]) + 1.3, abs=0.01)  # type: ignore[arg-type]
 
 
+def test_one_process_leaves_what_several_do(
+    fallen: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = []
+    for workers in ("1", "3"):
+        output = tmp_path / workers
+        given = ("shrink", str(fallen), "--output", str(output), "--workers", workers)
+        assert main(given) == 0
+        said.append(capsys.readouterr().out.replace(str(output), ""))
+
+    assert said[0] == said[1]
+    assert summary_of(tmp_path / "1")["state_hash"] == summary_of(tmp_path / "3")["state_hash"]
+
+
 def state_in(keyframe: Keyframe, setting: TrialSetting) -> tuple[int, bytes, bytes]:
     """Stamp, position and velocity in a simulator's keyframe."""
     setup = make_character_setup(setting.plan.character, setting.plan.simulator)
@@ -149,7 +164,7 @@ def test_a_recording_that_is_not_repeated_leaves_nothing(
     def other(*given: object, **named: object) -> Ended:
         raise ReplayError("tick 3 differs")
 
-    monkeypatch.setattr(shrinking_module, "run_trial", other)
+    monkeypatch.setattr(trials_module, "run_trial", other)
     assert main(["shrink", str(fallen), "--output", str(tmp_path / "out")]) == 1
 
     assert capsys.readouterr().err.endswith("error: tick 3 differs\n")
@@ -172,9 +187,11 @@ def test_an_interruption_keeps_the_best_so_far(
             signal.raise_signal(signal.SIGINT)
         return run_trial(setting, events, *given, **named)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(shrinking_module, "run_trial", interrupted)
+    monkeypatch.setattr(trials_module, "run_trial", interrupted)
     monkeypatch.setattr(interruption, "_is_interrupted", False)  # as it is again afterwards
-    assert main(["shrink", str(fallen), "--output", str(tmp_path / "best")]) == 130
+    assert (
+        main(["shrink", str(fallen), "--output", str(tmp_path / "best"), "--workers", "1"]) == 130
+    )
 
     said = capsys.readouterr()
     assert "interrupted; the best so far" in said.err
