@@ -8,6 +8,7 @@ from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from typing import TypeVar
 
 import dask
@@ -24,6 +25,8 @@ Item = TypeVar("Item")
 LOST = (CancelledError, CommClosedError)
 """What Dask raises where a scheduler is there no more."""
 WORKERS_DIED = "each worker that was at it died"
+ALONE = Lock()
+"""For tasks: a worker's process with several threads has one engine at work all the same."""
 _PACKAGE = "actuated_characters"
 _PATIENCE = 10.0  # s until a scheduler must have answered
 _CONFIGURATION = {

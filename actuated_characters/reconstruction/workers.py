@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from threading import Lock
 from typing import TYPE_CHECKING
 
 from actuated_characters.reconstruction.problem import Problem
@@ -17,7 +16,6 @@ from msgs_config.runtime.extras import is_installed
 if TYPE_CHECKING:  # it takes a second to import, and is needed for several processes alone
     from distributed import Client
 
-_one_at_a_time = Lock()  # a process with several threads has one engine at work all the same
 _worlds: dict[str, TrialWorld] = {}  # of this process, by the search: one at most
 
 
@@ -81,7 +79,9 @@ class Workers:
 
 def _grow(session: str, problem: Problem, window_ticks: int, branch: Branch) -> Grown | Lost:
     """Grow a branch in a worker's process."""
-    with _one_at_a_time:
+    from actuated_characters.cluster import ALONE
+
+    with ALONE:
         if session not in _worlds:
             while _worlds:  # of a search that is over
                 _worlds.popitem()[1].close()

@@ -7,12 +7,11 @@ import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Lock
 from typing import TypeAlias
 
 from distributed import Client, Future, KilledWorker, as_completed, get_worker
 
-from actuated_characters.cluster import LOST, WORKERS_DIED, lost
+from actuated_characters.cluster import ALONE, LOST, WORKERS_DIED, lost
 from actuated_characters.sweep.row import Ask, Outcome, RowTask, compute
 from actuated_characters.sweep.until_fall import run_row_until_fall
 from actuated_characters.sweep.work import Answer
@@ -23,7 +22,6 @@ _MOST_SHOWN = 300  # characters of an error that nobody foresaw
 _MOST_TRIES = 5  # of a row that another worker is to do
 _WAITING = 3  # rows that wait, for each one that is computed
 _Result: TypeAlias = tuple[Outcome, str, str]  # the worker is named, and has its address
-_one_at_a_time = Lock()  # a process with several threads has one engine at work all the same
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,7 @@ def _work(task: RowTask, ask: Ask, versions: Mapping[str, str]) -> "_Result":
     ]
     if others:
         raise ConfigurationError(f"{by} has {', '.join(others)}; install the same there")
-    with _one_at_a_time:
+    with ALONE:
         run = run_row_until_fall if task.until_fall else None
         outcome = compute(task, ask, Path(worker.local_directory), run)
     return outcome, by, worker.address
