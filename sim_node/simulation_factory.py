@@ -10,6 +10,7 @@ from msgs_config.character.urdf.file_formats.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
+from msgs_config.terrain.file import SUFFIXES, terrain_urdf
 from sim_node.initial_state import CharacterSettings
 from sim_node.parameters import SimulatorParameters
 from sim_node.physics.settings import SimulationSettings
@@ -60,7 +61,11 @@ def make_simulation_settings(values: Values) -> SimulationSettings:
 
 
 def _read_terrain(path: str) -> UrdfOptions:
-    urdf = files.resolve(path, Path.cwd(), CharacterError)
-    text = read_urdf_text(urdf).text
-    check_urdf(urdf, text)
-    return UrdfOptions(urdf, text, fixed_base=True)
+    file = files.resolve(path, Path.cwd(), CharacterError)
+    text = (
+        terrain_urdf(file, files.read_text(file, CharacterError))
+        if file.suffix in SUFFIXES
+        else read_urdf_text(file).text
+    )
+    check_urdf(file, text)
+    return UrdfOptions(file, text, fixed_base=True)

@@ -50,7 +50,9 @@ class SimulationSettings(Settings):
     command_delay_ticks: int = shared(COMMAND_DELAY)
     substeps: int = parameter(1, "engine steps a tick", minimum=1, maximum=1000)
     world: WorldSettings = WorldSettings()
-    terrain: str = parameter(PLANE, "the ground: plane, none, or the path of a URDF")
+    terrain: str = parameter(
+        PLANE, "the ground: plane, none, or the path of a .yaml file of terrain, or of a URDF"
+    )
     speed_limit: float = parameter(500.0, "a speed beyond it is a divergence", unit="rad/s or m/s")
     ball_lifetime: float = parameter(
         0.0, "a thrown ball is taken out of the way after it; 0: never", unit="s"
