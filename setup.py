@@ -44,6 +44,7 @@ setup(
             "viewer/editor/time_edits.*s",
             "viewer/recorded/time_bar.*s",
         ],
+        "lecture": ["labs/stubs/*.py"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

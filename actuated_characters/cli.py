@@ -78,6 +78,7 @@ def _parser() -> argparse.ArgumentParser:
         add(commands)
     # by its name alone: the lecture's figures know this package, which does not know them
     import_module("lecture.framework.command").add_study(commands)
+    import_module("lecture.labs.command").add_grade(commands)
     for command in commands.choices.values():
         add_names(command)
     return parser

@@ -43,6 +43,20 @@ _Sole = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
+class Soles:
+    """The two soles in the world."""
+
+    points: FloatArray  # (2, 3) their middles, m
+    axes: FloatArray  # (2, 3, 3) of the feet's link frames, as columns
+
+    @property
+    def middle(self) -> FloatArray:
+        """The point (3,) between them, m."""
+        middle: FloatArray = 0.5 * (self.points[0] + self.points[1])
+        return middle
+
+
+@dataclass(frozen=True)
 class GroundWrenches:
     """The wrenches that the ground is to exert on the two feet, world axes."""
 
@@ -119,16 +133,28 @@ class BalanceController:
         Where they do not bear it all, the force acts beside the centre of mass and turns the body,
         which bends at the hips.
         """
-        origins, axes = model.link_frames(self._feet)
-        points = origins + fixed_order.apply(axes, self._centres)
-        middle, across = 0.5 * (points[0] + points[1]), points[1] - points[0]
-        arm = model.centre_of_mass() - middle
+        soles = self.soles(model)
+        arm = model.centre_of_mass() - soles.middle
         force = _virtual_force(model, arm, gains)
-        moment = fixed_order.cross(arm, force)
+        return self.shared(soles, force, fixed_order.cross(arm, force))
+
+    def soles(self, model: DynamicsModel) -> Soles:
+        """Where the soles are in the state that `model` has."""
+        origins, axes = model.link_frames(self._feet)
+        return Soles(origins + fixed_order.apply(axes, self._centres), axes)
+
+    def jacobians(self, model: DynamicsModel, soles: Soles) -> FloatArray:
+        """The Jacobians (2, 6, n) of the soles' middles, as `DynamicsModel.point_jacobian`."""
+        pairs = zip(self._feet, soles.points, strict=True)
+        return np.array([model.point_jacobian(foot, point) for foot, point in pairs])
+
+    def shared(self, soles: Soles, force: FloatArray, moment: FloatArray) -> GroundWrenches:
+        """The feet's wrenches of a force (3,) and its moment (3,) about the soles' middle."""
+        points, across = soles.points, soles.points[1] - soles.points[0]
         shift = _shift(moment, across, float(force[2]))
-        moment -= shift * fixed_order.cross(across, force)
+        moment = moment - shift * fixed_order.cross(across, force)
         shares = np.array(((0.5 - shift,), (0.5 + shift,)))
-        edges = fixed_order.product(axes, self._edges).swapaxes(-1, -2)  # now as rows
+        edges = fixed_order.product(soles.axes, self._edges).swapaxes(-1, -2)  # now as rows
         limits = shares * force[2] * self._half_lengths[:, ::-1]
         return GroundWrenches(points, shares * force, _bearable(shares * moment, edges, limits))
 

@@ -33,12 +33,14 @@ _DIRECTIONS = {
     "left": (0.0, 1.0),
     "right": (0.0, -1.0),
 }
+HIPS: Mapping[str, object] = {  # with stiff ones the trunk could not give way
+    **{f"gains.{side}_hip.p": 70.0 for side in ("right", "left")},
+    **{f"gains.{side}_hip.d": 25.0 for side in ("right", "left")},
+}
 _PARAMETERS: Mapping[str, object] = {
     "root_assistance": False,
     "balance.enabled": True,
-    # with stiff hips the trunk could not give way
-    **{f"gains.{side}_hip.p": 70.0 for side in ("right", "left")},
-    **{f"gains.{side}_hip.d": 25.0 for side in ("right", "left")},
+    **HIPS,
 }
 
 

@@ -1,0 +1,1 @@
+"""The exercises: stubs for students, and what grades their files by exact figures."""

@@ -1,0 +1,1 @@
+"""The exercises, one a module: `TITLE` and `grade(student, sheet)`."""

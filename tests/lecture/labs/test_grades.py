@@ -1,0 +1,75 @@
+"""Stubs fail, solutions have all points, and wrong ones what they deserve."""
+
+from pathlib import Path
+
+import pytest
+
+from lecture.labs.catalogue import LABS, stub_of
+from tests.lecture.labs.grading import grade, solution
+
+pytestmark = [pytest.mark.slow]
+
+# By lab: what is wrong, which words of the solution become which, and the points.
+WRONG = [
+    ("lab1", "no damping", (("+ damping * error_rate", "+ 0.0 * error_rate"),), 0),
+    ("lab1", "half of the critical damping", (("2.0 * math.sqrt", "1.0 * math.sqrt"),), 70),
+    ("lab1", "the integral's sign", (("+ integral_gain", "- integral_gain"),), 80),
+    (
+        "lab2",
+        "explicit PD",
+        (("known - period * damping * acceleration", "stiffness * error - damping * velocity"),),
+        0,
+    ),
+    ("lab2", "the error of now", (("(error - period * velocity)", "error"),), 70),
+    ("lab2", "the bias force's sign", (("known - bias", "known + bias"),), 10),
+    (
+        "lab3",
+        "the sign of the Jacobians' transposes",
+        (("bias - jacobians[0].T @ wrenches[0] -", "bias + jacobians[0].T @ wrenches[0] +"),),
+        25,
+    ),
+    ("lab3", "no damping", (("- 600.0 * velocity\n", "\n"),), 50),
+    ("lab3", "the moment's sign", (("np.cross(arm, force)", "np.cross(force, arm)"),), 30),
+]
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_a_solution_has_all_points(lab: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(solution(lab))
+
+    sheet = grade(lab, file)
+
+    assert sheet.errors == ()
+    assert sheet.points == sum(each.of for each in sheet.criteria) == 100
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_a_stub_has_few(lab: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_bytes(stub_of(lab))
+
+    assert grade(lab, file).points <= 10
+
+
+@pytest.mark.parametrize(
+    ("lab", "changes", "points"),
+    [
+        pytest.param(lab, changes, points, id=f"{lab}: {what}")
+        for lab, what, changes, points in WRONG
+    ],
+)
+def test_what_is_wrong_costs_points(
+    lab: str, changes: tuple[tuple[str, str], ...], points: int, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(solution(lab, *changes))
+
+    sheet = grade(lab, file)
+
+    assert sheet.points == points, [(each.what, each.measured) for each in sheet.criteria]
+
+
+@pytest.mark.parametrize("lab", LABS)
+def test_there_are_three_wrong_ones_of_each(lab: str) -> None:
+    assert sum(of == lab for of, *_ in WRONG) >= 3
