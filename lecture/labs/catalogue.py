@@ -11,6 +11,8 @@ LABS = {
     "lab1": "spring",
     "lab2": "stable_pd",
     "lab3": "balance",
+    "lab4": "simbicon",
+    "lab6": "planner",
 }
 _STUBS = Path(__file__).parent / "stubs"
 

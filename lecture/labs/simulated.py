@@ -16,11 +16,12 @@ from sim_node.physics.settings import STEADY_CONTACTS
 
 RATE = 240  # Hz
 PERIOD = 1.0 / RATE
-_PARAMETERS = {"engine": "mujoco", "rate": RATE, **STEADY_CONTACTS}  # an engine on every Python
+# an engine that is there on every Python
+ENGINE = {"engine": "mujoco", "rate": RATE, **STEADY_CONTACTS}
 
 
-Law = Callable[[int, StampedState], FloatArray]
-"""The efforts (n,) of a tick: its number, and the state."""
+Law = Callable[[int, StampedState, FloatArray | None], FloatArray]
+"""The efforts (n,) of a tick: its number, the state, and contact wrenches (links, 6) if watched."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ def simulate(
     start: StampedState | None = None,
     pushes: Mapping[int, Push] = MappingProxyType({}),
     goes_on: Callable[[StampedState], bool] = lambda state: True,
+    watch_contacts: bool = False,
     **parameters: object,
 ) -> Trace:
     """Simulate ticks while `goes_on`; the states are in the sheet's hash.
@@ -58,13 +60,14 @@ def simulate(
     """
     states: list[StampedState] = []
     diverged = False
-    given = {**_PARAMETERS, **parameters}
-    with Simulation(character, start, given, watch_contacts=False) as simulation:
+    given = {**ENGINE, **parameters}
+    with Simulation(character, start, given, watch_contacts=watch_contacts) as simulation:
         states.append(simulation.state)
         for tick in range(ticks):
             if tick in pushes:
                 simulation.push(pushes[tick].link, pushes[tick].force)
-            effort = law(tick, simulation.state)
+            contacts = simulation.contacts if watch_contacts else None
+            effort = law(tick, simulation.state, contacts)
             try:
                 states.append(simulation.step(effort))
             except SimulationError:

@@ -117,7 +117,7 @@ def _stands(student: Student, sheet: Sheet, pushes: Mapping[int, Push], seconds:
     lowest = _STANDING * float(body.start.position[2])
     tracking = (np.arange(len(body.stiffness)) >= _ROOT).astype(float)  # no hand holds the root
 
-    def law(tick: int, state: StampedState) -> FloatArray:
+    def law(tick: int, state: StampedState, contacts: FloatArray | None) -> FloatArray:
         model, desired = body.model, body.desired(tick + 1)
         model.update(state.position, state.velocity)
         error = model.error_of_state(desired.configuration.position)

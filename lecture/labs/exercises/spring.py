@@ -65,7 +65,7 @@ def grade(student: Student, sheet: Sheet) -> None:
 def _lift(sheet: Sheet, mass: float, force: _FORCE, height: float = 0.0) -> Trace:
     """The mass (kg) from a height (m), under a force (N) of the error (m) and its rate (m/s)."""
 
-    def law(tick: int, state: StampedState) -> FloatArray:
+    def law(tick: int, state: StampedState, contacts: FloatArray | None) -> FloatArray:
         error, rate = _TARGET - float(state.position[0]), -float(state.velocity[0])
         return np.array([force(error, rate)])
 

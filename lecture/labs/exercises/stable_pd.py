@@ -109,7 +109,7 @@ def _follows(student: Student, sheet: Sheet, clip: str, factor: float) -> Measur
     body = Body(load_character("humanoid"), {"clip": clip})
     stiffness, damping = factor * body.stiffness, factor * body.damping
 
-    def law(tick: int, state: StampedState) -> FloatArray:
+    def law(tick: int, state: StampedState, contacts: FloatArray | None) -> FloatArray:
         model, desired = body.model, body.desired(tick + 1)
         model.update(state.position, state.velocity)
         error = model.error_of_state(desired.configuration.position)
@@ -117,7 +117,7 @@ def _follows(student: Student, sheet: Sheet, clip: str, factor: float) -> Measur
         asked = _System(*motion, model.bias_force(), *gains, model.mass_matrix(), PERIOD)
         return _ask(student, asked)
 
-    def ours(tick: int, state: StampedState) -> FloatArray:
+    def ours(tick: int, state: StampedState, contacts: FloatArray | None) -> FloatArray:
         model, desired = body.model, body.desired(tick + 1)
         model.update(state.position, state.velocity)
         error = model.error_of_state(desired.configuration.position)

@@ -30,6 +30,23 @@ WRONG = [
     ),
     ("lab3", "no damping", (("- 600.0 * velocity\n", "\n"),), 50),
     ("lab3", "the moment's sign", (("np.cross(arm, force)", "np.cross(force, arm)"),), 30),
+    ("lab4", "right and left swapped", (("1 if state < 2 else 0", "0 if state < 2 else 1"),), 90),
+    ("lab4", "swing and stance swapped", (("1 if state < 2 else 0", "int(state) % 2"),), 30),
+    (
+        "lab4",
+        "a foot that is not placed",
+        (("angle + c_d * distance + c_v * velocity", "angle"),),
+        30,
+    ),
+    ("lab4", "the swing leg's sign", (("-torso - swing", "-torso + swing"),), 30),
+    (
+        "lab6",
+        "the dearest plans count",
+        (("np.exp(-(costs - costs.min()) /", "np.exp(costs /"),),
+        30,
+    ),
+    ("lab6", "no noise", (("plan + sigma * noise", "plan + 0.0 * noise"),), 30),
+    ("lab6", "hanging costs least", (("lack = 1.0 + np", "lack = 1.0 - np"),), 25),
 ]
 
 
