@@ -9,6 +9,15 @@ from tests.lecture.labs.grading import grade, solution
 
 pytestmark = [pytest.mark.slow]
 
+# The first digits of each solution's hash of states, the same with every Python and processor.
+HASHES = {
+    "lab1": "3e916f0439efbb70",
+    "lab2": "d0e77e177b008939",
+    "lab3": "edb099942b53f131",
+    "lab4": "2ac6ffa90f4ec9c6",
+    "lab6": "4858bdd400683198",
+}
+
 # By lab: what is wrong, which words of the solution become which, and the points.
 WRONG = [
     ("lab1", "no damping", (("+ damping * error_rate", "+ 0.0 * error_rate"),), 0),
@@ -59,6 +68,7 @@ def test_a_solution_has_all_points(lab: str, tmp_path: Path) -> None:
 
     assert sheet.errors == ()
     assert sheet.points == sum(each.of for each in sheet.criteria) == 100
+    assert sheet.state_hash.startswith(HASHES[lab])
 
 
 @pytest.mark.parametrize("lab", LABS)
