@@ -150,6 +150,7 @@ setup(
             "recorder = actuated_characters.recorder.main:main",
             "viewer = actuated_characters.viewer.main:main",
             "composed = actuated_characters.composed.main:main",
+            "ros2_control_bridge = actuated_characters.ros2_control.main:main",
             "actuated_characters = actuated_characters.cli:main",
         ],
     },

@@ -53,7 +53,12 @@ def include(file: str, **arguments: str) -> IncludeLaunchDescription:
     return IncludeLaunchDescription(source, launch_arguments=arguments.items())
 
 
-def start(executable: str, *parameters: str, namespace: str | None = None) -> OpaqueFunction:
+def start(
+    executable: str,
+    *parameters: str,
+    namespace: str | None = None,
+    remappings: tuple[tuple[str, str], ...] = (),
+) -> OpaqueFunction:
     """A node of this package, with the config, and the parameters whose arguments are not empty.
 
     It is in the namespace of the argument, or in the one given; its end is that of all.
@@ -71,12 +76,41 @@ def start(executable: str, *parameters: str, namespace: str | None = None) -> Op
                 # not among `parameters`, where a file that does not exist is no error
                 ros_arguments=["--params-file", CONFIG],
                 parameters=[{name: it for name, it in given.items() if it.perform(context)}],
+                remappings=list(remappings),
                 output="screen",
                 on_exit=Shutdown(reason=f"{executable} has ended"),
             )
         ]
 
     return OpaqueFunction(function=node)
+
+
+def start_controller_manager() -> Node:
+    """A controller manager of ros2_control, with the config; its end is that of all.
+
+    Without a name of its own its parameters are those of all nodes in its process: the one for the
+    hardware and each controller must take the simulated time as well.
+    """
+    return Node(
+        package="controller_manager",
+        executable="ros2_control_node",
+        namespace=LaunchConfiguration("namespace"),
+        ros_arguments=["--params-file", CONFIG],
+        parameters=[{"use_sim_time": True}],
+        output="screen",
+        on_exit=Shutdown(reason="ros2_control_node has ended"),
+    )
+
+
+def start_spawner(controller: str) -> Node:
+    """What loads a controller and makes it active, and ends then."""
+    return Node(
+        package="controller_manager",
+        executable="spawner",
+        namespace=LaunchConfiguration("namespace"),
+        arguments=[controller, "--controller-manager-timeout", "60"],
+        output="screen",
+    )
 
 
 def start_recorder() -> Node:

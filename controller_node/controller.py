@@ -186,6 +186,11 @@ class Controller:
         self._behaviour.carry = PlanarTransform()
         self._change_reference()
 
+    def wanted_position(self, stamp_ns: int) -> FloatArray:
+        """Where the reference is (n,) at a stamp, in the episode that goes on."""
+        tick = self._tracked.tick(stamp_ns)
+        return self._tracked.desired_at(tick).configuration.position
+
     def steer(
         self, velocity: tuple[float, float, float], *, start_ns: int, now_ns: int, episode_ns: int
     ) -> VelocityCommand:

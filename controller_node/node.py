@@ -243,6 +243,7 @@ class ControllerNode(ComposableNode):
         mode, outlook = self._controller.mode, self._controller.outlook
         self._outputs.publish_changes(mode, outlook, state.stamp_ns)
         self._outputs.publish(self._last_reply)
+        self._stamped_topics.judge(state, reference)
         if self._upcoming is not None:
             self._take_parameters(self._upcoming)
 
@@ -315,6 +316,7 @@ class ControllerNode(ComposableNode):
         self._episode_ns = stamp_ns
         self._controller.begin_episode(stamp_ns)
         self._outputs.begin_episode()
+        self._stamped_topics.begin_episode()
         self._awaited.begin()
 
     def _use_controller(self) -> None:

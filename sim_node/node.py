@@ -1,6 +1,7 @@
 """`sim_node`: the simulation behind its topics, in lockstep with controllers or real time."""
 
 import time
+from collections.abc import Mapping
 
 from msgs_config.bus.composition import AT_ONCE, UNTIL_A_MESSAGE, ComposableNode, Turns, ros_node
 from msgs_config.bus.diagnostics import DIAGNOSTICS_PERIOD, DiagnosticsPublisher
@@ -23,6 +24,8 @@ from sim_node.interface.publisher_diagnosis import (
 from sim_node.interface.publishers import wait_for_subscribers
 from sim_node.interface.services import Services
 from sim_node.interface.simulator_publisher import SimulatorPublisher
+from sim_node.interface.standard.entities import Entities
+from sim_node.interface.standard.requests import Operations, StandardServices, is_installed
 from sim_node.interface.world_interface import WorldInterface
 from sim_node.node_settings import NodeSettings
 from sim_node.parameters import SimulatorParameters, load_parameters
@@ -78,6 +81,19 @@ class SimNode(ComposableNode):
         self._run_services = Services(
             self.node, self._control, lambda: self._settings.step_count, self._resume, self._reset
         )
+        self._entities = Entities(self._simulation, self._world.throw)
+        self._standard = StandardServices(
+            Operations(
+                self._run_services,
+                self._control,
+                self._simulation,
+                self._entities,
+                str(loaded.values["terrain"]),
+                self._begin_with,
+            )
+        )
+        if is_installed():
+            self._standard.offer(self.node)
 
     @property
     def characters(self) -> list[str]:
@@ -132,7 +148,7 @@ class SimNode(ComposableNode):
         """
         try:
             yield from self._begin(stop)
-            while not stop and not self._finished:
+            while not (stop or self._finished or self._control.quits):
                 yield self._spin_once(executor)
         finally:
             self._run_services.end(executor)
@@ -231,6 +247,8 @@ class SimNode(ComposableNode):
         self._begin_tick()
         if self._control.tick():
             self._run_services.end_steps()
+        else:
+            self._standard.after_tick()
 
     def _on_conflict(self, character: CharacterInterface) -> None:
         if self._settings.is_realtime:
@@ -301,12 +319,21 @@ class SimNode(ComposableNode):
         self._simulation.reset(world, starts or {})
         self._keyframes.episode_ns = self._simulation.stamp_ns
         self._world.begin_episode()
+        self._entities.begin_episode()
         for each in self._characters:
             each.begin_episode()
         if starts is not None:
             self._publisher.change(self._given.in_force, last_ns if self._begun else None)
         if self._begun:
             self._begin_episode(self._simulation.stamp_ns)
+
+    def _begin_with(self, start: Mapping[str, list[float]]) -> str:
+        """Begin a new episode with other values of parameters; why not, empty if so."""
+        if reason := self._given.refusal(start):
+            return reason
+        self.node.set_own_parameters(start)
+        self._run_services.reset()
+        return ""
 
     def _change_parameters(self, values: Values) -> None:
         """Take changed parameters, at this tick's boundary."""

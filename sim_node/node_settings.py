@@ -1,5 +1,6 @@
 """What `sim_node` itself is set to, beside the simulation."""
 
+from msgs_config.character.urdf.ros2_control import COMMAND_INTERFACES
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import GivenSession
 from msgs_config.settings import Settings, parameter, shared
@@ -89,6 +90,11 @@ class NodeSettings(Settings):
         unit="Hz",
         minimum=0.001,
         maximum=1000.0,
+    )
+    ros2_control: tuple[str, ...] = parameter(
+        (),
+        "robot_description has a tag of ros2_control with these command interfaces; empty: no tag",
+        choices=COMMAND_INTERFACES,
     )
     sensing: SensingSettings = SensingSettings()
     frames: FrameNames = FrameNames()

@@ -25,6 +25,7 @@ MODULES = {
     "sim_node": "sim_node.main",
     "controller_node": "controller_node.main",
     "composed": "actuated_characters.composed.main",
+    "ros2_control_bridge": "actuated_characters.ros2_control.main",
     "recorder": "actuated_characters.recorder.main",
     "pusher": "actuated_characters.runs.perturbation_main",
     "fork": "actuated_characters.fork.main",

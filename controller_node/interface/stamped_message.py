@@ -21,7 +21,16 @@ def decode_stamped(raw: bytes, type_name: str, what: str, state_ns: int) -> tupl
     if len(raw) > _MAX_BYTES:
         raise MotionError(f"{what}: it has {len(raw)} bytes; it must have {_MAX_BYTES} or fewer")
     message = typed.decode(raw, type_name)
-    stamp = message.header.stamp
+    return message, checked_start(message.header.stamp, what, state_ns)
+
+
+def checked_start(stamp: Any, what: str, state_ns: int) -> int:
+    """The stamp in ns that something counts from; without one that of the present state.
+
+    Raises:
+        PastStampError: it is over; begins with `what`, as the next.
+        MotionError: it is too late.
+    """
     start_ns = typed.nanoseconds(stamp) or state_ns
     if start_ns < state_ns:
         raise PastStampError(
@@ -33,4 +42,4 @@ def decode_stamped(raw: bytes, type_name: str, what: str, state_ns: int) -> tupl
             f"{what}: its stamp is {stamp.sec} s and {stamp.nanosec} ns; it must be a time, and "
             "within 1e6 s"
         )
-    return message, start_ns
+    return start_ns

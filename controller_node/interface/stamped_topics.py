@@ -3,10 +3,13 @@
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from controller_node.behaviours.asked import asked_behaviour
 from controller_node.controller import Controller
 from controller_node.interface.publishers import ControllerPublishers
-from controller_node.interface.stamped_message import decode_stamped
+from controller_node.interface.stamped_message import checked_start, decode_stamped
+from controller_node.interface.trajectory_goals import TrackedTick, TrajectoryGoals
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.bus.node import BusNode
@@ -15,6 +18,12 @@ from msgs_config.bus.stamped_subscription import StampedSubscription
 from msgs_config.messages import topics, typed
 from msgs_config.messages.cdr import JOINT_STATE
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.state import StampedReference, StampedState
+
+_POINT = "trajectory_msgs/msg/JointTrajectoryPoint"
+_DURATION = "builtin_interfaces/msg/Duration"
+_LISTS = ("positions", "velocities", "accelerations", "effort")
+_STOP_TIME_NS = NANOSECONDS_PER_SECOND // 5
 
 
 class StampedTopics:
@@ -22,7 +31,7 @@ class StampedTopics:
 
     That is `~/joint_trajectory`, `~/strength` and `~/behaviour`; where the reference is steered,
     `cmd_vel` and `cmd_vel_stamped` as well. They are two topics: no node can subscribe to two types
-    on one.
+    on one. Beside them stands the action `~/follow_joint_trajectory`, where its package is.
     """
 
     def __init__(
@@ -39,6 +48,7 @@ class StampedTopics:
         self._strengths = self._subscribe(topics.STRENGTH, use=self._set_strengths)
         self._behaviours = self._subscribe(topics.BEHAVIOUR, use=self._ask)
         self._now_ns = self._episode_ns = 0
+        self._goals = TrajectoryGoals(node, controller.layout, self._accept, self._stop)
         self.use(controller, None)
 
     def use(self, controller: Controller, upcoming: Controller | None) -> None:
@@ -58,6 +68,22 @@ class StampedTopics:
                 each.close()
             self._velocities = []
 
+    def judge(self, state: StampedState, reference: StampedReference) -> None:
+        """Judge the goal of an action by a state that was answered, and its reference."""
+        self._goals.judge(
+            TrackedTick(
+                state.stamp_ns,
+                state.position,
+                state.velocity,
+                reference.position,
+                reference.velocity,
+            )
+        )
+
+    def begin_episode(self) -> None:
+        """End what does not outlive an episode."""
+        self._goals.begin_episode()
+
     @property
     def refused(self) -> dict[str, int]:
         """Numbers of rejected messages, for the diagnostics."""
@@ -76,6 +102,7 @@ class StampedTopics:
         """
         self._now_ns, self._episode_ns = state_ns, episode_ns
         self._trajectories.take()
+        self._goals.take()
         if self._controller.is_steered:
             for each in self._velocities:
                 each.take()
@@ -84,6 +111,31 @@ class StampedTopics:
 
     def _set_trajectory(self, raw: bytes) -> None:
         message, start_ns = decode_stamped(raw, typed.JOINT_TRAJECTORY, "trajectory", self._now_ns)
+        self._track(message, start_ns)
+        self._goals.replaced()
+        typed.set_stamp(message, start_ns)
+        self._outputs.publish_trajectory(message)
+
+    def _accept(self, trajectory: Any) -> int:
+        """Track the trajectory of an action's goal; the stamp of its start, ns."""
+        start_ns = checked_start(trajectory.header.stamp, "trajectory", self._now_ns)
+        self._track(trajectory, start_ns)
+        message = _as_typed(trajectory)
+        typed.set_stamp(message, start_ns)
+        self._outputs.publish_trajectory(message)
+        return start_ns
+
+    def _stop(self, names: tuple[str, ...]) -> None:
+        """Bring everything to rest where it is wanted now: the goal of an action is cancelled."""
+        where = self._controller.wanted_position(self._now_ns)
+        point = typed.new(
+            _POINT,
+            positions=where[self._controller.layout.indices(names)],
+            time_from_start=typed.new(_DURATION, nanosec=_STOP_TIME_NS),
+        )
+        self._accept(typed.new(typed.JOINT_TRAJECTORY, joint_names=list(names), points=[point]))
+
+    def _track(self, message: Any, start_ns: int) -> None:
         points = message.points
         self._controller.set_trajectory(
             points_of_lists(
@@ -100,8 +152,6 @@ class StampedTopics:
             now_ns=self._now_ns,
             episode_ns=self._episode_ns,
         )
-        typed.set_stamp(message, start_ns)
-        self._outputs.publish_trajectory(message)
 
     def _steer_stamped(self, raw: bytes) -> None:
         message, start_ns = decode_stamped(raw, typed.TWIST_STAMPED, "cmd_vel", self._now_ns)
@@ -144,6 +194,22 @@ class StampedTopics:
         )
         self._controller.ask(asked, episode_ns=self._episode_ns)
         self._outputs.publish_behaviour(asked)
+
+
+def _as_typed(trajectory: Any) -> Any:
+    """A trajectory of whatever class, as one that can be serialised here."""
+    points = [
+        typed.new(
+            _POINT,
+            **{name: np.array(getattr(each, name), dtype=float) for name in _LISTS},
+            time_from_start=typed.new(
+                _DURATION, sec=each.time_from_start.sec, nanosec=each.time_from_start.nanosec
+            ),
+        )
+        for each in trajectory.points
+    ]
+    names = list(trajectory.joint_names)
+    return typed.new(typed.JOINT_TRAJECTORY, joint_names=names, points=points)
 
 
 def _listed(velocity: tuple[float, float, float]) -> str:

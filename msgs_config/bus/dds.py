@@ -20,11 +20,20 @@ from rclpy.task import Future
 from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import SetBool, Trigger
 
-from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
+from msgs_config.bus.node import (
+    NO_SERVICES,
+    Answer,
+    Change,
+    Endpoint,
+    GoalHandler,
+    Handler,
+    Refusal,
+    TypedHandler,
+)
 from msgs_config.bus.polling import DirectSubscription, PollingExecutor
 from msgs_config.bus.ros_parameters import declare, given_parameters, plain_value, set_request
 from msgs_config.errors import ConfigurationError
-from msgs_config.messages.topic import Topic
+from msgs_config.messages.topic import Topic, find_message_class
 from msgs_config.parameters import Parameter, Values
 
 _UNKNOWN_NODE = "_UNKNOWN_"  # ROS says this of a node whose name has not come yet
@@ -115,6 +124,36 @@ class DdsClient:
         return answer
 
 
+class DdsGoal:
+    """A goal of an action, as rclpy hands it over."""
+
+    def __init__(self, handle: Any, kind: Any) -> None:
+        self.request, self.result = handle.request, kind.Result()
+        self._handle, self._kind = handle, kind
+
+    @property
+    def feedback(self) -> Any:
+        """A message to be filled and published as feedback."""
+        return self._kind.Feedback()
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether its client no longer wants it."""
+        return bool(self._handle.is_cancel_requested)
+
+    def publish(self, feedback: Any) -> None:
+        """Publish how far it is."""
+        self._handle.publish_feedback(feedback)
+
+
+async def _given(answer: Answer) -> None:
+    """Wait until an answer is given."""
+    if not answer.is_given:
+        given = Future()
+        answer.when_given(lambda: given.set_result(None))
+        await given
+
+
 class DdsNode(Node):
     """A node of rclpy that is a `BusNode`."""
 
@@ -153,19 +192,56 @@ class DdsNode(Node):
         Calls are handled between the turns of the node.
         """
 
-        async def respond(request: Any, response: Any) -> Any:
+        def fill(request: Any, response: Any) -> Answer:
             answer = handler(request.data if takes_flag else True)
-            if not answer.is_given:
-                given = Future()
-                answer.when_given(lambda: given.set_result(None))
-                await given
-            response.success, response.message = answer.success, answer.message
+
+            def write() -> None:
+                response.success, response.message = answer.success, answer.message
+
+            answer.when_given(write)
+            return answer
+
+        self._serve(service, SetBool if takes_flag else Trigger, fill)
+
+    def offer_typed(self, service: str, type_name: str, handler: TypedHandler) -> None:
+        """Offer `~/SERVICE` of a type, `PACKAGE/srv/TYPE`, whose package is installed."""
+        self._serve(service, find_message_class(type_name), handler)
+
+    def _serve(self, service: str, kind: Any, handler: TypedHandler) -> None:
+        async def respond(request: Any, response: Any) -> Any:
+            await _given(handler(request, response))
             return response
 
         # In a group of its own: in the node's an awaited answer would keep all others waiting.
         group = ReentrantCallbackGroup()
-        kind = SetBool if takes_flag else Trigger
         self.create_service(kind, f"~/{service}", respond, callback_group=group)
+
+    def offer_action(self, action: str, type_name: str, handler: GoalHandler) -> None:
+        """Offer the action `~/ACTION` of a type, `PACKAGE/action/TYPE`, likewise."""
+        from rclpy.action import ActionServer, CancelResponse
+
+        kind = find_message_class(type_name)
+
+        async def pursue(handle: Any) -> Any:
+            goal = DdsGoal(handle, kind)
+            answer = handler(goal)
+            await _given(answer)
+            if goal.is_cancelled:
+                handle.canceled()
+            elif answer.success:
+                handle.succeed()
+            else:
+                handle.abort()
+            return goal.result
+
+        ActionServer(
+            self,
+            kind,
+            f"~/{action}",
+            pursue,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
+        )
 
     def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> DdsClient:
         """A client of another node, by its name in this namespace."""

@@ -12,7 +12,16 @@ from functools import partial
 from typing import Any
 
 from msgs_config.bus.composition import errors_of
-from msgs_config.bus.node import NO_SERVICES, Answer, Change, Endpoint, Handler, Refusal
+from msgs_config.bus.node import (
+    NO_SERVICES,
+    Answer,
+    Change,
+    Endpoint,
+    GoalHandler,
+    Handler,
+    Refusal,
+    TypedHandler,
+)
 from msgs_config.messages.topic import Topic
 from msgs_config.parameters import Parameter, Values
 
@@ -200,6 +209,8 @@ class InProcessNode:
 
     def __init__(self, bus: Bus, name: str, namespace: str, given: Mapping[str, object]) -> None:
         self.handlers: dict[str, Handler] = {}  # by service
+        self.typed_handlers: dict[str, TypedHandler] = {}
+        self.goal_handlers: dict[str, GoalHandler] = {}
         self._bus, self._name = bus, name
         self._namespace = "/" + namespace.strip("/")
         self._log = InProcessLog(bus, self.get_fully_qualified_name().lstrip("/"))
@@ -271,6 +282,16 @@ class InProcessNode:
         """Offer `~/SERVICE`."""
         del takes_flag  # a call without a flag hands over true
         self.handlers[service] = handler
+
+    def offer_typed(self, service: str, type_name: str, handler: TypedHandler) -> None:
+        """Offer `~/SERVICE`, which is called with any objects that have the type's fields."""
+        del type_name
+        self.typed_handlers[service] = handler
+
+    def offer_action(self, action: str, type_name: str, handler: GoalHandler) -> None:
+        """Offer the action `~/ACTION` likewise."""
+        del type_name
+        self.goal_handlers[action] = handler
 
     def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> InProcessClient:
         """A client of another node, by its name in this namespace."""

@@ -27,7 +27,7 @@ class LiveParameters:
         self._parameters = list(parameters)
         self._values = values
         self._take = take
-        node.watch_parameters(self._refusal, self._change)
+        node.watch_parameters(self.refusal, self._change)
 
     def declare(self, parameters: Iterable[Parameter], values: Values) -> None:
         """Declare parameters whose values were not known before."""
@@ -35,7 +35,8 @@ class LiveParameters:
         self._values = Values(self._values | {each.name: values[each.name] for each in late})
         self._node.declare(late, values)
 
-    def _refusal(self, changes: Mapping[str, object]) -> str:
+    def refusal(self, changes: Mapping[str, object]) -> str:
+        """Why changes cannot be taken; empty if they can."""
         try:
             self._check_values(self._with(changes))
         except ActuatedCharactersError as error:

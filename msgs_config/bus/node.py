@@ -84,22 +84,52 @@ class Answer:
         """Without `success` it is given by `give`."""
         self.success, self.message = bool(success), message
         self.is_given = success is not None
-        self._when_given: Callable[[], object] = lambda: None
+        self._when_given: list[Callable[[], object]] = []
 
     def give(self, success: bool, message: str = "") -> None:
         """Give the answer."""
         self.success, self.message, self.is_given = success, message, True
-        self._when_given()
+        for act in self._when_given:
+            act()
 
     def when_given(self, act: Callable[[], object]) -> None:
         """Do something as soon as it is given."""
-        self._when_given = act
+        self._when_given.append(act)
         if self.is_given:
             act()
 
 
 Handler = Callable[[bool], Answer]
 """What a service does; it is handed the request's flag, true where the request is empty."""
+TypedHandler = Callable[[Any, Any], Answer]
+"""Fills a service's response from its request; the response is sent when the answer is given."""
+
+
+class Goal(Protocol):
+    """A goal of an action."""
+
+    @property
+    def request(self) -> Any:
+        """The goal's message."""
+
+    @property
+    def feedback(self) -> Any:
+        """A message to be filled and published as feedback."""
+
+    @property
+    def result(self) -> Any:
+        """The message to be filled before the goal's answer is given."""
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether its client no longer wants it."""
+
+    def publish(self, feedback: Any) -> None:
+        """Publish how far it is."""
+
+
+GoalHandler = Callable[[Goal], Answer]
+"""Pursues a goal; its answer says whether it has succeeded, and comes when it is over."""
 Refusal = Callable[[dict[str, Any]], str]
 """Why changes of parameters, by name, cannot be; empty if they can."""
 Change = Callable[[dict[str, Any]], None]
@@ -190,6 +220,12 @@ class BusNode(Protocol):
 
         Calls are handled between the turns of the node.
         """
+
+    def offer_typed(self, service: str, type_name: str, handler: TypedHandler) -> None:
+        """Offer `~/SERVICE` of a type, `PACKAGE/srv/TYPE`, whose package is installed."""
+
+    def offer_action(self, action: str, type_name: str, handler: GoalHandler) -> None:
+        """Offer the action `~/ACTION` of a type, `PACKAGE/action/TYPE`, likewise."""
 
     def client(self, node: str, services: Mapping[str, bool] = NO_SERVICES) -> Client:
         """A client of another node, by its name in this namespace.

@@ -21,6 +21,7 @@ SIM_NODE = "sim_node"
 CONTROLLER_NODE = "controller_node"
 RECORDER_NODE = "recorder"
 VIEWER_NODE = "viewer"
+BRIDGE_NODE = "ros2_control_bridge"
 
 JOINT_STATES = Topic(
     "joint_states",
@@ -252,6 +253,28 @@ VISUALIZATION = Topic(
         "per simulated second, like the three before it"
     ),
 )
+ROBOT_JOINT_STATES = Topic(
+    "robot_joint_states",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "ros2_control_bridge → controller manager",
+    kept=Kept.IF_NAMED,
+    content=(
+        "the state for [ros2_control](ros2_control.md), at its update rate and stamped with its "
+        "time: all hinges and sliders that have a motor, `effort` zero in an episode's first state"
+    ),
+)
+ROBOT_JOINT_COMMANDS = Topic(
+    "robot_joint_commands",
+    "sensor_msgs/msg/JointState",
+    STREAM,
+    "controller manager → ros2_control_bridge",
+    kept=Kept.IF_NAMED,
+    content=(
+        "its answer, with whatever stamp: `position`, `velocity` and `effort` of each name, or "
+        "none; a number that is not finite commands nothing"
+    ),
+)
 INITIAL_STATE = Topic(
     "~/initial_state",
     "sensor_msgs/msg/JointState",
@@ -420,7 +443,7 @@ CLOCK = Topic(
     STREAM,
     "sim_node → all",
     of_world=True,
-    content="every tick",
+    content="every tick; of a controller manager `ros2_control_bridge` has the clock",
 )
 EPISODE = Topic(
     "episode",

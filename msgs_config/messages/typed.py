@@ -39,7 +39,7 @@ def constants(type_name: str) -> Any:
     return types().types[type_name]
 
 
-def new(type_name: str, **fields: Any) -> Any:
+def new(type_name: str, /, **fields: Any) -> Any:
     """A message with these fields; all others are as ROS has them by default."""
     _, definitions = types().fielddefs[type_name]
     values = {name: _default(kind) for name, kind in definitions if name not in fields}

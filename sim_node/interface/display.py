@@ -11,6 +11,7 @@ from msgs_config.bus.node import BusNode, Publisher
 from msgs_config.bus.publishing import has_subscribers
 from msgs_config.character.urdf.described_joints import DescribedJoints
 from msgs_config.character.urdf.robot_description import robot_description
+from msgs_config.character.urdf.ros2_control import with_ros2_control
 from msgs_config.geometry import fixed_order, rotations, scalars
 from msgs_config.messages import topics
 from msgs_config.messages.cdr import DoublesEncoder, encode_string
@@ -26,6 +27,19 @@ _POSITION, _ORIENTATION = slice(0, 3), slice(3, 7)
 _LINEAR, _ANGULAR = slice(43, 46), slice(46, 49)
 _VARIANCES = np.concatenate((7 + 7 * np.arange(6), 49 + 7 * np.arange(6)))
 _EXACT_VARIANCE = 1e-9  # m^2, rad^2 or their rates': a zero would mean that it is unknown
+
+
+def _describe(node: BusNode, character: SimulatedCharacter, settings: NodeSettings) -> str:
+    """The character's URDF, with a tag of ros2_control if it is asked for."""
+    whole, name = character.character, character.setup.name
+    description = robot_description(whole, settings.frames.base)
+    if not settings.ros2_control:
+        return description
+    states, commands = (
+        node.resolve_topic_name(topic.under(name).name)
+        for topic in (topics.ROBOT_JOINT_STATES, topics.ROBOT_JOINT_COMMANDS)
+    )
+    return with_ros2_control(description, whole, settings.ros2_control, states, commands)
 
 
 class _WrenchPublisher(NamedTuple):
@@ -60,7 +74,7 @@ class DisplayPublishers:
         self._visualization = create(topics.VISUALIZATION)
         self._joint_states = create(topics.DESCRIPTION_JOINT_STATES)
         self._description = create(topics.ROBOT_DESCRIPTION)
-        self._description.publish(encode_string(robot_description(whole, settings.frames.base)))
+        self._description.publish(encode_string(_describe(node, character, settings)))
         self._wrenches = list(self._make_wrenches(create))
         self._transforms: TransformPublisher | None = None
         if topics.TF.is_installed:

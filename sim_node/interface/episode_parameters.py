@@ -74,6 +74,10 @@ class EpisodeParameters:
         }
         return {name: start for name, start in starts.items() if start is not None}
 
+    def refusal(self, changes: Mapping[str, object]) -> str:
+        """Why changes of parameters cannot be taken; empty if they can."""
+        return self._live.refusal(changes)
+
     def _show_starts(self, names: Mapping[str, object]) -> None:
         """Give the node's parameters the values that came from controllers."""
         shown = {

@@ -42,33 +42,52 @@ class Services:
         self.end_steps("the simulation ends")
         executor.serve_pending()  # the last step may have been the run's last tick
 
-    def _on_pause(self, pauses: bool) -> Answer:
-        if pauses:
-            self._control.pause()
-            self.end_steps("paused before")
-        elif self._control.paused:
-            try:
-                self._control.resume()
-            except CommandError as error:
-                return Answer(False, str(error))
+    def pause(self) -> None:
+        """Stop before the next tick."""
+        self._control.pause()
+        self.end_steps("paused before")
+
+    def resume(self) -> None:
+        """Go on. Raises CommandError if the simulation has diverged."""
+        if self._control.paused:
+            self._control.resume()
             self.end_steps("resumed before")
             self._resume()
-        return Answer(True, "paused" if self._control.paused else "running")
 
-    def _on_step(self, _: bool) -> Answer:
-        """Answer when the steps are done, or when something has ended them."""
-        ticks = self._step_ticks()
-        try:
-            self._control.begin_steps(ticks)
-        except CommandError as error:
-            return Answer(False, str(error))
+    def step(self, ticks: int) -> Answer:
+        """Take ticks; the answer is given when they are done, or something has ended them.
+
+        Raises:
+            CommandError: it is not paused, has diverged, or others are not done yet.
+        """
+        self._control.begin_steps(ticks)
         answer = self._steps = Answer()
         self._stepped = ticks
         self._resume()  # it may end the steps at once
         return answer
 
-    def _on_reset(self, _: bool) -> Answer:
+    def reset(self) -> None:
+        """Begin a new episode; a paused simulator stays paused."""
         self._control.reset()
         self.end_steps("reset before")
         self._reset()
+
+    def _on_pause(self, pauses: bool) -> Answer:
+        try:
+            if pauses:
+                self.pause()
+            else:
+                self.resume()
+        except CommandError as error:
+            return Answer(False, str(error))
+        return Answer(True, "paused" if self._control.paused else "running")
+
+    def _on_step(self, _: bool) -> Answer:
+        try:
+            return self.step(self._step_ticks())
+        except CommandError as error:
+            return Answer(False, str(error))
+
+    def _on_reset(self, _: bool) -> Answer:
+        self.reset()
         return Answer(True, "a new episode, paused" if self._control.paused else "a new episode")

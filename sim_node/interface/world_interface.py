@@ -39,6 +39,10 @@ class WorldInterface:
         self._messages.take()
         return self._queue.take(self._simulation.tick)
 
+    def throw(self, throw: ProjectileThrow) -> None:
+        """Let a ball or box go with the next tick. Raises CommandError if there are too many."""
+        self._queue.add(throw, self._simulation.tick)
+
     def begin_episode(self) -> None:
         """Discard what was sent in the episode before, taken already or not."""
         self._queue.clear()

@@ -10,6 +10,7 @@ class RunControl:
         self.paused = False
         self.fault: str | None = None
         self.steps_left = 0
+        self.quits = False  # the node ends in good order
         self.has_diverged = False  # the state is of no use any more: only a reset helps
 
     @property

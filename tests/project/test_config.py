@@ -17,6 +17,8 @@ from actuated_characters.bags.recording import read_recordings
 from actuated_characters.metrics.state_hash import StateHash
 from actuated_characters.replay.replay import replay
 from actuated_characters.replay.through_topics import replay_commands
+from actuated_characters.ros2_control import parameters as for_bridge
+from actuated_characters.ros2_control.timetable import UpdatePeriod
 from actuated_characters.runs.bare_loop import ticks_in_process
 from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.processes import MODULES
@@ -39,13 +41,19 @@ from tests.support.ros import Process, Processes, ReceivedMessages, SimulatorCli
 CONFIG = Path(__file__).parents[2] / "config"
 SIMULATOR, CONTROLLER = "/sim_node", "/controller_node"
 SIDES = ("left", "right")
+BRIDGE = "/ros2_control_bridge"
+OF_ROS2_CONTROL = ("/controller_manager", "/joint_trajectory_controller")
 NODES = {  # full names of the nodes that each file is for
     "franka_panda_realtime.yaml": [SIMULATOR, CONTROLLER],
+    "franka_panda_ros2_control.yaml": [SIMULATOR, BRIDGE, *OF_ROS2_CONTROL],
     "humanoid_balance.yaml": [SIMULATOR, CONTROLLER],
     "humanoid_walk.yaml": [SIMULATOR, CONTROLLER],
     "pendulum.yaml": [SIMULATOR, CONTROLLER],
     "two_humanoids.yaml": [SIMULATOR, *(f"/{side}{CONTROLLER}" for side in SIDES)],
 }
+WITHOUT_CONTROLLER_NODE = "franka_panda_ros2_control.yaml"
+PAIRS = sorted(NODES.keys() - {WITHOUT_CONTROLLER_NODE})
+"""The files of a simulator and its `controller_node`."""
 LAYOUTS = ("actuated_characters.rviz", "foxglove.json")  # see test_layouts.py
 SHARED = (
     "character",
@@ -107,7 +115,7 @@ def test_everything_in_a_file_is_for_one_of_its_nodes(file: str) -> None:
     assert all(given(file, node) for node in NODES[file])
 
 
-@pytest.mark.parametrize("file", NODES)
+@pytest.mark.parametrize("file", PAIRS)
 def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
     parts = load_parameters(given(file, SIMULATOR)).characters
 
@@ -118,6 +126,18 @@ def test_both_sides_agree_on_what_they_must_agree_on(file: str) -> None:
         }
         commanded = for_controller.commanded_joints(character, values)
         assert set(part.values["commanded_joints"]) == set(commanded)
+
+
+def test_the_bridge_agrees_with_both_of_its_sides() -> None:
+    simulator, bridge, manager, _ = (
+        given(WITHOUT_CONTROLLER_NODE, node) for node in NODES[WITHOUT_CONTROLLER_NODE]
+    )
+    character = load_character(bridge["character"])
+
+    assert for_bridge.resolved(character, bridge)["rate"] == simulator["rate"]
+    assert simulator["character"] == bridge["character"]
+    assert bridge["update_rate"] == manager["update_rate"]
+    UpdatePeriod(bridge["rate"], bridge["update_rate"]).whole_ns(bridge["start_time"])
 
 
 MOTIONS = ["humanoid_balance.yaml", "humanoid_walk.yaml", "two_humanoids.yaml"]
@@ -162,7 +182,7 @@ def have_been_answered(states: ReceivedMessages) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", sorted(NODES.keys() - MOTIONS))  # those are recorded below
+@pytest.mark.parametrize("file", sorted({*PAIRS} - {*MOTIONS}))  # those are recorded below
 def test_the_nodes_start_with_a_file_and_run(
     processes: Processes, client: SimulatorClient, file: str
 ) -> None:

@@ -20,6 +20,7 @@ import pytest
 import yaml
 
 from actuated_characters.recorder import parameters as for_recorder
+from actuated_characters.ros2_control import parameters as for_bridge
 from controller_node import parameters as for_controller
 from msgs_config.character.loading import load_character
 from sim_node import parameters as for_simulator
@@ -64,7 +65,8 @@ class LaunchFile:
     values: Mapping[str, str]
     declared: dict[str, dict[str, Any]] = field(default_factory=dict)
     included: list[tuple[str, dict[str, str]]] = field(default_factory=list)
-    nodes: list[dict[str, Any]] = field(default_factory=list)
+    nodes: list[dict[str, Any]] = field(default_factory=list)  # of this package
+    others: list[dict[str, Any]] = field(default_factory=list)
 
     def add(self, entity: Made) -> None:
         if entity.kind == "DeclareLaunchArgument":
@@ -78,7 +80,8 @@ class LaunchFile:
                 self.add(inner)
         else:
             assert entity.kind == "Node"
-            self.nodes.append(entity.named)
+            own = entity.named["package"] == PACKAGE
+            (self.nodes if own else self.others).append(entity.named)
 
     @property
     def arguments(self) -> set[str]:
@@ -88,7 +91,11 @@ class LaunchFile:
     @property
     def used(self) -> set[str]:
         """The arguments whose values its nodes use."""
-        return {each.given[0] for each in parts(self.nodes) if each.kind == "LaunchConfiguration"}
+        return {
+            each.given[0]
+            for each in parts([self.nodes, self.others])
+            if each.kind == "LaunchConfiguration"
+        }
 
 
 def parts(value: Any) -> Iterator[Made]:
@@ -130,6 +137,7 @@ def parameters_of(executable: str) -> set[str]:
         "sim_node": for_simulator.PARAMETERS + for_simulator.character_parameters(humanoid),
         "controller_node": for_controller.PARAMETERS,
         "recorder": for_recorder.PARAMETERS,
+        "ros2_control_bridge": for_bridge.PARAMETERS,
     }
     return {parameter.name for parameter in parameters[executable]}
 
@@ -154,6 +162,7 @@ def test_there_is_a_launch_file_for_each_set_of_nodes() -> None:
     assert started == {  # beside what they include
         "composed.launch.py": ["composed"],
         "everything.launch.py": ["recorder"],
+        "ros2_control.launch.py": ["sim_node", "ros2_control_bridge"],
         "simulator.launch.py": ["sim_node"],
         "simulator_controller.launch.py": ["controller_node"],
         "two_humanoids.launch.py": ["sim_node", "controller_node", "controller_node"],
@@ -245,6 +254,26 @@ def test_the_parameter_file_ships(name: str) -> None:
     declared = read(name).declared
     if "config" in declared:
         assert (PROJECT / "config" / declared["config"]["default_value"]).is_file()
+
+
+def test_the_controller_manager_and_its_controllers_are_those_of_the_config() -> None:
+    file = read("ros2_control.launch.py")
+    config = yaml.safe_load(
+        (PROJECT / "config" / file.declared["config"]["default_value"]).read_text()
+    )
+    manager, *spawners = file.others
+    known = config["/**/controller_manager"]["ros__parameters"]
+
+    assert manager["executable"] == "ros2_control_node" and manager["on_exit"].kind == "Shutdown"
+    assert manager["parameters"] == [{"use_sim_time": True}]
+    assert {each["arguments"][0] for each in spawners} == {
+        name for name, value in known.items() if isinstance(value, dict)
+    }
+    assert all("on_exit" not in each for each in spawners)  # they end when it is active
+    bridge = config["/**/ros2_control_bridge"]["ros__parameters"]
+    assert bridge["update_rate"] == known["update_rate"]
+    (simulator,) = (each for each in file.nodes if each["executable"] == "sim_node")
+    assert simulator["remappings"] == [("/clock", "sim_clock")]
 
 
 def test_controllers_stand_in_the_namespaces_of_the_two_characters() -> None:

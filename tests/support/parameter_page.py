@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from actuated_characters.recorder import parameters as recorder
+from actuated_characters.ros2_control import parameters as bridge
 from controller_node import parameters as controller
 from msgs_config.character.loading import load_character
 from msgs_config.parameters import Parameter
@@ -60,6 +61,7 @@ def content() -> str:
             *controller.character_parameters(character),
         ],
         "recorder": recorder.PARAMETERS,
+        "ros2_control_bridge": bridge.declared(character),
     }
     return "\n".join([HEAD, *(section(f"`{node}`", each) for node, each in nodes.items())])
 
