@@ -13,7 +13,10 @@ from tests.support.ros import Processes
 
 PROJECT = Path(__file__).parents[2]
 PACKAGE = "actuated_characters"
-EXECUTABLES = {"sim_node", "controller_node", "composed", "recorder", "viewer", PACKAGE}
+EXECUTABLES = {
+    *("sim_node", "controller_node", "composed", "recorder", "viewer", "ros2_control_bridge"),
+    PACKAGE,
+}
 NOT_SOURCES = (".*", "__pycache__", "*.egg-info", "build", "install", "log", "runs")
 AS_COLCON_DOES = ("--single-version-externally-managed", "--record", "install.log")
 
