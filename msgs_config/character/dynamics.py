@@ -31,6 +31,7 @@ class DynamicsModel:
         self._mass_matrix = np.zeros((self._layout.size, self._layout.size))
         self._damping = character.passive_damping()
         self._is_damped = bool(self._damping.any())
+        self._armature = character.armature()
         self._coupling = character.coupling.rows(self._layout.size) if character.coupling else None
         # M is stored by rows of its lower triangle, the diagonal last
         self._diagonal = (self._model.M_rowadr + self._model.M_rownnz - 1).astype(np.intp)
@@ -216,6 +217,8 @@ class DynamicsModel:
         self._data.qacc[:] = acceleration
         mujoco.mj_rne(self._model, self._data, 1, effort)
         effort += self._damping * self._qvel
+        if self._armature.any():  # the recursion of MuJoCo knows links alone
+            effort += self._armature * acceleration
         return effort
 
     def gravity_force(self) -> FloatArray:

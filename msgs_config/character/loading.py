@@ -138,6 +138,11 @@ def _apply_file(joint: Joint, file: CharacterFile) -> Joint:
                 f"{file.loading.urdf_path}: joint '{name}' has a {kind} of {value:g}; it must be 0 "
                 f"or more, or not count ('joint_{kind}: none' in {file.path.name})"
             )
+    if not 0.0 <= joint.armature < math.inf:
+        raise CharacterError(
+            f"{file.loading.urdf_path}: joint '{name}' has an armature of {joint.armature:g}; it "
+            "must be 0 or more"
+        )
     if name in file.friction and joint.type is JointType.SPHERICAL:
         raise CharacterError(
             f"{file.path}: joints.{name}.friction: it is for hinges and sliders, this joint is "

@@ -115,6 +115,7 @@ class Joint:
     effort_limit: float = np.inf  # N m or N, of the vector's norm for a ball joint
     damping: float = 0.0  # passive; N m s/rad or N s/m
     friction: float = 0.0  # passive, of a hinge or slider; the most that it has, N m or N
+    armature: float = 0.0  # of its motor's rotor, added to the mass matrix; kg m^2 or kg
     mimic: Mimic | None = None  # says what a hinge or slider follows, which follows none itself
     soft_limit: SoftLimit | None = None  # a ball joint may have one
 
@@ -354,6 +355,13 @@ class Character:
         for joint in self.moving_joints:
             damping[self.layout.joint(joint.name).entries] = joint.damping
         return damping
+
+    def armature(self) -> FloatArray:
+        """What motors add to each entry (n,) of the mass matrix's diagonal, kg m^2 or kg."""
+        armature = np.zeros(self.layout.size)
+        for joint in self.moving_joints:
+            armature[self.layout.joint(joint.name).entries] = joint.armature
+        return armature
 
     def position_bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bound (n,) of each entry; infinite where the joint has none."""

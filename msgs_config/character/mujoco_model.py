@@ -115,7 +115,8 @@ def _add_body(parent: mujoco.MjsBody, link: Link, prefix: str) -> mujoco.MjsBody
 
 def _add_joint(body: mujoco.MjsBody, joint: Joint, prefix: str) -> None:
     axis = joint.axis_in_child if any(joint.axis_in_child) else (0.0, 0.0, 1.0)
-    body.add_joint(name=prefix + joint.name, type=_MUJOCO_TYPES[joint.type], axis=axis)
+    kind = _MUJOCO_TYPES[joint.type]
+    body.add_joint(name=prefix + joint.name, type=kind, axis=axis, armature=joint.armature)
 
 
 def geometry(spec: mujoco.MjSpec, shape: Shape) -> dict[str, object]:

@@ -27,6 +27,9 @@ UNLIMITED_SPEED = 1e9
 class Body(Protocol):
     """A character in a world."""
 
+    has_armature: bool
+    """Whether the engine knows the armature of joints; if not, it is a passive force."""
+
     def read(self) -> FloatArray:
         """Position and velocity, (2, n)."""
 

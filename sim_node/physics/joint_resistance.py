@@ -4,7 +4,8 @@ With the velocity v' that they lead to at the end of a step h, and all other for
 
     M (v' - v) / h + C = f - D v' + r + J^T m
 
-where r is friction, `|r_i| <= F_i`, which is F_i against a velocity and at rest whatever keeps it
+where M has the armature of joints, of which Bullet knows nothing: to it that is a force as well;
+r is friction, `|r_i| <= F_i`, which is F_i against a velocity and at rest whatever keeps it
 there, with the force of a limit that is reached; and `J v' = -c (J q - b) / h` is the coupling
 of followers, of forces m. It is implicit Euler, so it is stable at any D and F, for links of any
 mass, and in the position that they are in. Which joints rest is found by trial: one that rests by
@@ -31,15 +32,18 @@ _FORCE_ROUNDING = 1e-9  # share of a force that may be wrong without consequence
 class JointResistance:
     """What resists the motion of one character's joints; `active` if anything does."""
 
-    def __init__(self, character: Character, step_s: float) -> None:
-        """For engine steps of `step_s`."""
+    def __init__(self, character: Character, step_s: float, *, has_armature: bool = True) -> None:
+        """For steps of `step_s` of an engine that knows the armature of joints, or does not."""
         joints, layout = character.moving_joints, character.layout
         self._step_s, self._coupling = step_s, character.coupling
         self._damping = character.passive_damping()
         self.friction: FloatArray = np.zeros(layout.size)  # (n,) N m or N
         for joint in joints:
             self.friction[layout.joint(joint.name).entries] = joint.friction
-        self.active = bool(self._damping.any() or self.friction.any() or self._coupling)
+        self._armature = character.armature() * (not has_armature)
+        """Armature (n,) that the engine does not know, kg m^2 or kg: it resists acceleration."""
+        resists = self._damping.any() or self.friction.any() or self._armature.any()
+        self.active = bool(resists or self._coupling)
         self._lower, self._upper = character.position_bounds()
         driven = layout.mask(name for name in layout.joint_names if name != "root")
         self._resisted = driven & self.active
@@ -77,6 +81,8 @@ class JointResistance:
                 break
         self.spare = np.where(rests & ~stopped, np.maximum(self.friction - np.abs(force), 0.0), 0.0)
         whole = model.inverse_dynamics(acceleration) - self._damping * velocity - known
+        if self._armature.any():
+            whole = whole - self._armature * acceleration
         return np.where(self._resisted, whole, 0.0)
 
     def _first_guess(

@@ -21,14 +21,19 @@ class PassiveForces:
     `active` is true if there are any.
     """
 
-    def __init__(self, character: Character, step_s: float, gravity: float) -> None:
-        """For engine steps of `step_s`, and a gravity in m/s^2 along -z."""
+    def __init__(
+        self, character: Character, step_s: float, gravity: float, *, has_armature: bool = True
+    ) -> None:
+        """For engine steps of `step_s`, and a gravity in m/s^2 along -z.
+
+        `has_armature` says whether the engine knows the armature of joints.
+        """
         self._step_s, self._coupling = step_s, character.coupling
         self._has_floating_base = character.layout.has_floating_base
         self._rotation_entries = character.layout.rotation_entries[self._has_floating_base :]
         is_limited = any(joint.soft_limit is not None for joint in character.moving_joints)
         self._limits = SoftLimitForces(character, step_s) if is_limited else None
-        self.resistance = JointResistance(character, step_s)
+        self.resistance = JointResistance(character, step_s, has_armature=has_armature)
         self.active = is_limited or self.resistance.active
         self._model = DynamicsModel(character, gravity) if self.active else None
 

@@ -66,6 +66,8 @@ def measure_probe(
         body.apply(effort - character.passive_damping() * velocity)
         world.step()
         acceleration = (body.read()[1] - velocity) / INSTANT
+    if not body.has_armature:  # which resists as a passive force there: it is a part of the effort
+        effort = effort + character.armature() * acceleration
     return DynamicsSample(position, velocity, effort, energy, acceleration)
 
 

@@ -120,7 +120,9 @@ class SimulatedCharacter:
 
         Its gravity is in m/s^2 along -z.
         """
-        self._passive = PassiveForces(self.character, self._step_s, gravity)
+        self._passive = PassiveForces(
+            self.character, self._step_s, gravity, has_armature=body.has_armature
+        )
         self._delayed = deque([np.zeros(self.layout.size)] * self._delay_ticks)
         self._body, self.balls = body, balls
         body.set_state(self._position, self._velocity)

@@ -155,6 +155,7 @@ def _read_joint(
         effort_limit=effort if effort > 0.0 else math.inf,
         damping=_number(dynamics, "damping") if is_scalar else 0.0,
         friction=_number(dynamics, "friction") if is_scalar else 0.0,
+        armature=_number(dynamics, "armature"),
     )
 
 

@@ -40,7 +40,7 @@ NUMBERS = {  # how many numbers, and how small at least, by element and attribut
     },
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), (1, _ANY)),
     "mimic": dict.fromkeys(("multiplier", "offset"), (1, _ANY)),
-    "dynamics": dict.fromkeys(("damping", "friction"), (1, _ANY)),
+    "dynamics": dict.fromkeys(("damping", "friction", "armature"), (1, _ANY)),
     "box": {"size": (3, _POSITIVE)},
     "sphere": {"radius": (1, _POSITIVE)},
     "cylinder": {"radius": (1, _POSITIVE), "length": (1, _POSITIVE)},

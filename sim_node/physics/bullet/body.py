@@ -38,6 +38,8 @@ class BulletBody:
     a link, in the order of `Character.links`.
     """
 
+    has_armature = False
+
     def __init__(
         self,
         client: Engine,
@@ -57,7 +59,7 @@ class BulletBody:
             CharacterError: the engine refuses the URDF or a mesh, or reads a link otherwise.
         """
         self._client, self._touched, self._ball_bodies = client, touched, balls
-        self._layout = character.layout
+        self._layout, self._armature = character.layout, character.armature()
         self._body = load_urdf(client, character.loading)
         self._floating = self._layout.has_floating_base
         poses = [link.inertial_pose for link in character.links]
@@ -247,8 +249,9 @@ class BulletBody:
         return [self._centre_at_step, *(state[0] for state in states)]
 
     def kinetic_energy(self) -> float:
-        """Kinetic energy of all links, J, by the engine's own masses, inertia and velocities."""
-        energy = 0.0
+        """Kinetic energy of links and rotors, J, by the engine's masses, inertia and velocities."""
+        velocity = self.read()[1]
+        energy = 0.5 * float(fixed_order.dot(self._armature * velocity, velocity))
         for number, state in zip(self._numbers, self._link_states(velocities=True), strict=True):
             _, turn, *_, linear, angular = map(np.array, state)
             mass, _, inertia, *_ = pybullet.getDynamicsInfo(

@@ -27,6 +27,8 @@ _NO_TURN_WXYZ = [1.0, 0.0, 0.0, 0.0]
 class MujocoBody(Part):
     """A character in a world."""
 
+    has_armature = True
+
     def __init__(self, world: "MujocoWorld", character: Character, speed_bound: float) -> None:
         super().__init__(character.links)
         self._world, self.character, self.speed_bound = world, character, speed_bound

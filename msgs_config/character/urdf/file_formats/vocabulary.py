@@ -80,7 +80,7 @@ _ROBOT = _known(
         child=_known("link"),
         axis=_known("xyz"),
         limit=_known("lower upper effort velocity"),
-        dynamics=_known("damping friction"),
+        dynamics=_known("damping friction armature"),
         mimic=_known("joint multiplier offset"),
     ),
     material=_MATERIAL,

@@ -206,7 +206,7 @@ IN_JOINT = {
     "all but the first <dynamics> of a joint": "<dynamics/><dynamics damping='3'/>",
     "all but the first <parent> of a joint": '<parent link="arm"/>',
     "<inertial> in <joint>": "<inertial/>",
-    "'armature' of <dynamics>": '<dynamics armature="1"/>',
+    "'stiffness' of <dynamics>": '<dynamics stiffness="1"/>',
     "'xzy' of <axis>": '<axis xzy="0 0 1"/>',
     "velocity limits, which nothing keeps": '<limit lower="-3" upper="3" velocity="2"/>',
 }
