@@ -56,7 +56,7 @@ _KINDS: dict[str, tuple[str, str]] = {  # what a file is, and what to do with it
     ".xacro": ("a xacro file", _CHARACTER),
     ".sdf": ("a model or world of Gazebo (SDF)", _FROM_URDF),
     ".world": ("a world of Gazebo (SDF)", _FROM_URDF),
-    ".mjcf": ("a model of MuJoCo (MJCF)", _FROM_URDF),
+    ".mjcf": ("a model of MuJoCo (MJCF)", _CHARACTER),
     ".srdf": ("what MoveIt adds to a URDF (SRDF)", _FROM_URDF),
     ".proto": ("a model of Webots (PROTO)", _FROM_URDF),
     **dict.fromkeys((".step", ".stp", ".sldasm"), ("a model", _FROM_URDF)),
@@ -80,7 +80,9 @@ _KINDS: dict[str, tuple[str, str]] = {  # what a file is, and what to do with it
         ),
     ),
 }
-_ROOTS = {"robot": ".urdf", "mujoco": ".mjcf", "mujocoinclude": ".mjcf", "COLLADA": ".dae"}
+_PART = "mujocoinclude"
+_KINDS[_PART] = ("a part of a model of MuJoCo (MJCF)", "give the file that includes it")
+_ROOTS = {"robot": ".urdf", "mujoco": ".mjcf", _PART: _PART, "COLLADA": ".dae"}
 _ROOTS |= dict.fromkeys(("sdf", "gazebo", "world", "model"), ".sdf")
 
 

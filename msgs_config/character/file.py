@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from msgs_config import files
+from msgs_config.character.mjcf_settings import read_mjcf_file
 from msgs_config.character.model import ClipFormat, Gains, Planning, SoftLimit, UrdfOptions, Vector
 from msgs_config.character.sensors import Sensor, read_sensors
 from msgs_config.character.urdf.file_formats.formats import (
@@ -41,6 +42,7 @@ ALONE: dict[str, Any] = {
     "automatic_gains": AUTOMATIC_GAINS_HZ,
 }
 """The keys of a URDF alone; all others have their defaults."""
+_MJCF_ALONE = {key: ALONE[key] for key in ("on_ground", "automatic_gains")}
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class CharacterFile:
     sensors: tuple[Sensor, ...]
     # Kinds of what does not count in the URDF of which no line is printed.
     left_out: frozenset[str]
-    misread: tuple[str, ...]  # the line that says so if the URDF is not in its encoding
+    misread: tuple[str, ...]  # lines about a text that is not in its encoding, or no URDF
 
 
 def shipped_characters() -> list[str]:
@@ -124,13 +126,16 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
     content: dict[str, Any] = {"urdf": path.name, **ALONE}
     if text or not is_urdf(path):
         content = files.parse_yaml_mapping(path, text, CharacterError)
+    mjcf = read_mjcf_file(path, content, _MJCF_ALONE) if urdf is None else None
+    if mjcf is not None:
+        text, content = mjcf.text, mjcf.content
     reader = MappingReader(path, content, CharacterError)
     reader.check_keys(_KEYS)
     joints = reader.parts("joints", _JOINT_KEYS)
     reader.part("root_assistance").check_keys(["force", "torque"])
     assistance = reader.parts("root_assistance", _GAIN_KEYS)
     rest_pose = reader.part("rest_pose")
-    loading, misread = read_urdf_settings(path, reader, joints, urdf)
+    loading, misread = read_urdf_settings(path, reader, joints, urdf, mjcf)
     return CharacterFile(
         name=_name(path),
         path=path,
@@ -157,7 +162,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
         planning=_read_planning(reader.part("planner"), joints),
         sensors=read_sensors(reader.part("sensors")),
         left_out=frozenset(reader.names("left_out", "elements and attributes", default=[])),
-        misread=misread,
+        misread=(*misread, *(() if mjcf is None else mjcf.remarks)),
     )
 
 

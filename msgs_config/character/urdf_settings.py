@@ -4,6 +4,7 @@ from pathlib import Path
 
 from msgs_config import files
 from msgs_config.character.joints.joint_bounds import write_bounds
+from msgs_config.character.mjcf_settings import MjcfFile
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
 from msgs_config.character.urdf.file_formats.source import read_urdf_text
@@ -22,6 +23,7 @@ def read_urdf_settings(
     reader: MappingReader,
     joints: dict[str, MappingReader],
     known: tuple[Path, str] | None,
+    mjcf: MjcfFile | None = None,
 ) -> tuple[UrdfOptions, tuple[str, ...]]:
     """How the URDF is to be read, and lines about its text.
 
@@ -30,16 +32,19 @@ def read_urdf_settings(
         reader: Its content.
         joints: The parts of its key `joints`, by the joint's name.
         known: The URDF's path and its text, bounds and all, where the file there does not count.
+        mjcf: What an MJCF says that is in the URDF's place.
 
     Raises:
         CharacterError: the URDF cannot be read or used; names its file, or the key.
     """
     misread = ""
-    if known is None:
+    if known is not None:
+        urdf, text = known
+    elif mjcf is not None:
+        urdf, text = mjcf.urdf, mjcf.urdf_text
+    else:
         urdf = resolve_key(path, reader, "urdf")
         text, misread = read_urdf_text(urdf, _read_arguments(reader.part("xacro")))
-    else:
-        urdf, text = known
     scale = reader.number("scale", default=1.0, minimum=1e-6)
     inertia = reader.choice("inertia", ["file", "shapes", "filled"])
     bounds = {

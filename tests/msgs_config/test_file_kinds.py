@@ -25,7 +25,7 @@ KINDS = {  # name: content, what it is, what to do
     "walk.npz": ("PK\3\4", "an archive of NumPy arrays", "motion import"),
     "robot.urdf": (URDF, "the description of a robot (URDF)", "--character"),
     "robot.xml": (URDF, "the description of a robot (URDF)", "--character"),
-    "model.xml": ("<!-- a --><mujoco model='m'/>", "a model of MuJoCo (MJCF)", "URDF"),
+    "model.xml": ("<!-- a --><mujoco model='m'/>", "a model of MuJoCo (MJCF)", "--character"),
     "world.xml": ("<sdf version='1.9'/>", "a model or world of Gazebo (SDF)", "URDF"),
     "other.xml": ("<launch/>", "an XML file whose root is <launch>", "URDF"),
     "empty.xml": ("", "an XML file", "URDF"),

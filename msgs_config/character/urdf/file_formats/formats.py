@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 from msgs_config.errors import CharacterError
 from msgs_config.file_kinds import describe_root
 
-URDF_SUFFIXES = (".urdf", ".xacro", ".xml")
-"""Of files that a URDF may be in, in lower case."""
+URDF_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
+"""Of files that a URDF, or an MJCF in its place, may be in, in lower case."""
 YAML_SUFFIXES = (".yaml", ".yml")
 
 CHARACTER_FILE = "a character, which is a .urdf or .xacro file, or a .yaml file that names one"

@@ -102,7 +102,7 @@ def test_a_file_of_another_format_is_named_as_what_it_is(tmp_path: Path, key: bo
 
 ROOTS = {
     '<sdf version="1.7"><model name="m"/></sdf>': "is a model or world of Gazebo (SDF)",
-    '<mujoco model="m"><worldbody/></mujoco>': "is a model of MuJoCo (MJCF)",
+    "<mujocoinclude/>": "is a part of a model of MuJoCo (MJCF)",
     "<COLLADA/>": "is a mesh or scene (COLLADA)",
     "<other/>": "is an XML file whose root is <other>",
     "<!DOCTYPE html>\n<html/>": "a web page, not the file itself",

@@ -1,0 +1,155 @@
+"""An MJCF file as MuJoCo compiles it: defaults, includes, `fromto`, angles and inertia resolved.
+
+MuJoCo refuses a file of which a mesh or a picture is missing. A character may do without: of what
+is only seen, and with `collision: none` of all shapes. So a shape whose mesh is missing is compiled
+as a small ball, where that cannot change an inertia.
+"""
+
+import math
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from msgs_config import files
+from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
+from msgs_config.errors import CharacterError
+
+SUFFIXES = (".xml", ".mjcf")
+_ROOT = "mujoco"
+_STAND_IN = 1e-3  # m, the radius of the ball in the place of a mesh that is missing
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
+_HEIGHTS = mujoco.mjtGeom.mjGEOM_HFIELD
+
+
+class CompiledMjcf(NamedTuple):
+    """An MJCF file."""
+
+    path: Path
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    stand_ins: dict[int, str]
+    """The mesh of each shape that was compiled as a ball, by the shape's number."""
+    remarks: tuple[LeftOut, ...]
+    """A line for each kind of what had to be taken away before it could be compiled."""
+
+    def name(self, kind: str, number: int) -> str:
+        """The name of a thing of a kind such as `body`; one without a name gets its number."""
+        return str(getattr(self.model, kind)(number).name) or f"{kind}_{number}"
+
+
+def is_mjcf(path: Path) -> bool:
+    """Whether a file is one of MuJoCo: an XML whose root is `<mujoco>`.
+
+    Raises:
+        CharacterError: the file cannot be read.
+    """
+    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+        return False
+    text = files.read_xml(path, CharacterError).text
+    return files.parse_xml(path, text, CharacterError).tag == _ROOT
+
+
+def compile_mjcf(path: Path) -> CompiledMjcf:
+    """Compile a file.
+
+    Raises:
+        CharacterError: MuJoCo refuses it, or a mesh is missing on which an inertia depends.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        remarks = _take_away_pictures(spec)
+        balls = _replace_missing(path, spec)
+        model = spec.compile()
+    except CharacterError:
+        raise
+    except Exception as error:  # whatever MuJoCo raises: ValueError, FatalError, ...
+        raise CharacterError(f"{path}: not usable by MuJoCo: {_one_line(error)}") from error
+    stand_ins = {int(geom.id): name for geom, name in balls}
+    return CompiledMjcf(path, spec, model, stand_ins, tuple(remarks))
+
+
+def mesh_name(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> str:
+    """A mesh's file as a URDF beside the MJCF names it; empty for one without a file."""
+    return os.path.relpath(_mesh_path(path, spec, mesh), path.parent) if mesh.file else ""
+
+
+def _mesh_path(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> Path:
+    name = Path(mesh.file).name if spec.strippath else mesh.file
+    return path.parent / (mesh.compiler.meshdir or spec.compiler.meshdir or "") / name
+
+
+def _take_away_pictures(spec: mujoco.MjSpec) -> list[LeftOut]:
+    """Remove what only pictures need and whose files may be missing; a line of each kind."""
+    remarks = []
+    names = [each.name for each in spec.textures]
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for texture in list(spec.textures):
+        spec.delete(texture)
+    skins = [each.name for each in spec.skins]
+    for skin in list(spec.skins):
+        spec.delete(skin)
+    for kind, found in (("texture", names), ("skin", skins)):
+        if found:
+            remarks.append(LeftOut(kind, f"left out: <{kind}> ({len(found)}){_named(found)}"))
+    return remarks
+
+
+def _replace_missing(path: Path, spec: mujoco.MjSpec) -> list[tuple[mujoco.MjsGeom, str]]:
+    """Replace shapes by balls where their files are missing; each with the mesh that it had."""
+    missing = {each.name: each for each in spec.meshes if _is_missing(path, spec, each)}
+    balls = []
+    for geom in spec.geoms:
+        if geom.type == _HEIGHTS:
+            _make_ball(geom)
+        elif geom.meshname in missing:
+            mesh = missing[geom.meshname]
+            if _weighs(spec, geom):
+                raise CharacterError(
+                    f"{path}: body '{geom.parent.name}' has the inertia of a mesh that is missing: "
+                    f"{_mesh_path(path, spec, mesh)}"
+                )
+            balls.append((geom, mesh_name(path, spec, mesh)))
+            _make_ball(geom)
+    for each in (*missing.values(), *spec.hfields):
+        spec.delete(each)
+    return balls
+
+
+def _is_missing(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> bool:
+    if not mesh.file:
+        return False
+    file = _mesh_path(path, spec, mesh)
+    try:
+        return not file.is_file() or files.is_lfs_pointer(file)
+    except OSError:
+        return True
+
+
+def _weighs(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
+    """Whether the inertia of a body follows from this shape."""
+    body, compiler = geom.parent, spec.compiler
+    always = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    if (body.explicitinertial and not always) or body.name == "world":
+        return False
+    least, most = compiler.inertiagrouprange
+    mass = geom.density if math.isnan(geom.mass) else geom.mass
+    return bool(mass) and least <= geom.group <= most
+
+
+def _make_ball(geom: mujoco.MjsGeom) -> None:
+    geom.type, geom.meshname, geom.hfieldname = mujoco.mjtGeom.mjGEOM_SPHERE, "", ""
+    geom.size, geom.mass, geom.density = np.full(3, _STAND_IN), 0.0, 0.0
+    geom.fromto = np.full(6, math.nan)
+
+
+def _named(names: list[str]) -> str:
+    found = listed(name for name in names if name)
+    return f": {found}" if found else ""
+
+
+def _one_line(error: Exception) -> str:
+    return "; ".join(line.strip() for line in str(error).splitlines() if line.strip())[:500]
