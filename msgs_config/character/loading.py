@@ -74,7 +74,9 @@ def build_character(file: CharacterFile, collides: bool = True) -> Character:
     _check_names(file, layout, repairs.fixed)
     check_followers(file, links)
     _check_rest_pose(file, links)
-    has_shapes = {link.name: bool(link.collision_shapes) for link in links}
+    # where nothing collides, a force sensor has nothing to measure, and is no mistake
+    may_touch = not file.loading.collisions
+    has_shapes = {link.name: may_touch or bool(link.collision_shapes) for link in links}
     check_sensors(file.path, file.sensors, has_shapes)
     character = Character(
         name=file.name,

@@ -7,6 +7,8 @@ as a small ball, where that cannot change an inertia.
 
 import math
 import os
+import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,16 +61,40 @@ def compile_mjcf(path: Path) -> CompiledMjcf:
         CharacterError: MuJoCo refuses it, or a mesh is missing on which an inertia depends.
     """
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        remarks = _take_away_pictures(spec)
-        balls = _replace_missing(path, spec)
-        model = spec.compile()
-    except CharacterError:
-        raise
-    except Exception as error:  # whatever MuJoCo raises: ValueError, FatalError, ...
-        raise CharacterError(f"{path}: not usable by MuJoCo: {_one_line(error)}") from error
+        return _compile(path)
+    except ValueError as error:  # a part of a scene may name what is in the rest of it
+        reason = _one_line(error)
+        with suppress(ValueError):
+            return _compile(path, reason)
+        raise CharacterError(f"{path}: not usable by MuJoCo: {reason}") from error
+
+
+def _compile(path: Path, refused: str = "") -> CompiledMjcf:
+    """Compile a file; without sensors, pairs and excludes, if it was refused with them.
+
+    Raises:
+        CharacterError: a mesh is missing on which an inertia depends.
+        ValueError: MuJoCo refuses it.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+            remarks = _take_away_pictures(spec)
+            if refused:
+                remarks.append(_take_away_references(spec, refused))
+            balls = _replace_missing(path, spec)
+            model = spec.compile()
+        except mujoco.FatalError as error:
+            raise ValueError(str(error)) from error
     stand_ins = {int(geom.id): name for geom, name in balls}
     return CompiledMjcf(path, spec, model, stand_ins, tuple(remarks))
+
+
+def _take_away_references(spec: mujoco.MjSpec, reason: str) -> LeftOut:
+    for each in (*spec.sensors, *spec.pairs, *spec.excludes):
+        spec.delete(each)
+    return LeftOut("refused", f"left out: all <sensor>, <pair> and <exclude>: {reason}")
 
 
 def mesh_name(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> str:

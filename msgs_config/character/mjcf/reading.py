@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from msgs_config import files
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointType
 from msgs_config.character.mjcf.actuators import Drive, read_drives, remark_actuators
 from msgs_config.character.mjcf.compiling import compile_mjcf
@@ -48,7 +49,7 @@ def read_mjcf(path: Path) -> MjcfCharacter:
     home, positions = _rest(mjcf.model)
     content = {
         "fixed_base": not robot.floats,
-        "rest_pose": _rest_pose(mjcf.model, robot, positions),
+        "rest_pose": _rest_pose(mjcf.model, robot, positions, set(followers)),
         "joints": _joints(mjcf.model, robot, drives, set(followers)),
         "sensors": read_sensors(mjcf, robot),
     }
@@ -70,7 +71,7 @@ def read_mjcf(path: Path) -> MjcfCharacter:
     )
 
 
-def _rest(model: mujoco.MjModel) -> tuple[int, np.ndarray[Any, Any]]:
+def _rest(model: mujoco.MjModel) -> tuple[int, FloatArray]:
     """The keyframe of the rest pose, and its positions (nq,); without one -1, and the file's."""
     for key in range(model.nkey):
         if model.key(key).name == HOME:
@@ -87,16 +88,20 @@ def _remark_keys(model: mujoco.MjModel, home: int) -> list[LeftOut]:
 
 
 def _rest_pose(
-    model: mujoco.MjModel, robot: Robot, positions: np.ndarray[Any, Any]
+    model: mujoco.MjModel, robot: Robot, positions: FloatArray, followers: set[int]
 ) -> dict[str, float]:
-    """The content of the key `rest_pose`: what is not zero, within the joints' ranges."""
+    """The content of the key `rest_pose`: what is not zero, within the joints' ranges.
+
+    Followers rest where their leaders say.
+    """
     pose: dict[str, float] = {}
     if robot.floats:
         (joint,) = [j for j in range(model.njnt) if model.jnt_bodyid[j] == robot.bodies[0]]
         start = int(model.jnt_qposadr[joint])
         numbers = [*positions[start : start + 3], *_vector(positions[start + 3 : start + 7])]
         pose |= _named(ROOT, JointType.FLOATING, numbers)
-    for joint, name in robot.joints.items():
+    for joint in robot.joints.keys() - followers:
+        name = robot.joints[joint]
         start = int(model.jnt_qposadr[joint])
         if model.jnt_type[joint] == _BALL:
             pose |= _named(name, JointType.SPHERICAL, _vector(positions[start : start + 4]))
@@ -108,7 +113,7 @@ def _rest_pose(
     return pose
 
 
-def _vector(quaternion_wxyz: np.ndarray[Any, Any]) -> list[float]:
+def _vector(quaternion_wxyz: FloatArray) -> list[float]:
     turn = rotations.normalised(rotations.xyzw_from_wxyz(np.array(quaternion_wxyz)))
     return [float(each) for each in rotations.log(turn)]
 
