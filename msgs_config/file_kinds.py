@@ -109,6 +109,12 @@ def refuse_other_kind(
         raise error(f"{path} is {what}, not {wanted}; {advice}")
 
 
+def root_tag(text: str) -> str:
+    """The name of the element that an XML text begins with; empty without one."""
+    found = _ROOT.search(_COMMENT.sub(b"", text.encode()))
+    return found[1].decode("latin-1") if found else ""
+
+
 def describe_root(tag: str) -> tuple[str, str]:
     """What an XML file with this root is, and what to do with it."""
     if tag in _ROOTS:
@@ -134,6 +140,5 @@ def _kind(path: Path, suffixes: Collection[str]) -> tuple[str, str] | None:
     if suffix in suffixes:
         return None
     if suffix == ".xml":
-        root = _ROOT.search(_COMMENT.sub(b"", begin))
-        return describe_root(root[1].decode("latin-1") if root else "")
+        return describe_root(root_tag(begin.decode("latin-1")))
     return _KINDS.get(suffix)

@@ -34,7 +34,7 @@ _CLIP_KEYS = ("files", "joints", "up_axis", "quaternion", "base_rotation", "sign
 _POSE_KEYS = (
     *("joint_damping", "joint_friction", "rest_pose", "on_ground", "joints", "automatic_gains"),
 )
-_OTHER_KEYS = ("root_assistance", "clips", "feet", "planner", "sensors")
+_OTHER_KEYS = ("root_assistance", "root_armature", "clips", "feet", "planner", "sensors")
 _KEYS = (*URDF_KEYS, "left_out", "up_axis", *_POSE_KEYS, *_OTHER_KEYS)
 ALONE: dict[str, Any] = {
     "inertia": "filled",
@@ -65,6 +65,7 @@ class CharacterFile:
     friction: dict[str, float]  # joint name -> N m or N
     soft_limits: dict[str, SoftLimit]  # ball joint name -> its limit
     assistance: dict[str, Gains]
+    root_armature: float  # of a floating base, kg and kg m^2
     clips: ClipFormat
     feet: tuple[str, ...]
     planning: Planning
@@ -157,6 +158,7 @@ def _parse(path: Path, text: str, urdf: tuple[Path, str] | None) -> CharacterFil
             if "soft_limit" in joint.content
         },
         assistance={name: _read_gains(part) for name, part in assistance.items()},
+        root_armature=reader.number("root_armature", default=0.0, minimum=0.0),
         clips=_read_clip_format(path, reader.part("clips")),
         feet=reader.names("feet", "links", default=[]),
         planning=_read_planning(reader.part("planner"), joints),

@@ -119,7 +119,9 @@ def _load_links(robot: ElementTree.Element, file: CharacterFile) -> list[Link]:
     links = read_links(robot, loading)
     _check_links(loading.urdf_path, links)
     _check_mass(robot, loading)
-    joints = [replace(links[0].joint, pose_in_parent=_pose_fixed_base(file))]
+    armature = 0.0 if loading.fixed_base else file.root_armature
+    root = replace(links[0].joint, pose_in_parent=_pose_fixed_base(file), armature=armature)
+    joints = [root]
     joints += [_apply_file(link.joint, file) for link in links[1:]]
     return [
         replace(

@@ -46,7 +46,7 @@ class JointResistance:
         self.active = bool(resists or self._coupling)
         self._lower, self._upper = character.position_bounds()
         driven = layout.mask(name for name in layout.joint_names if name != "root")
-        self._resisted = driven & self.active
+        self._resisted = (driven | (self._armature > 0.0)) & self.active
         self.spare = self.friction.copy()
         """Friction (n,) that the last effort has left, for contacts: N m or N."""
 

@@ -18,6 +18,7 @@ import numpy as np
 from msgs_config import files
 from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
 from msgs_config.errors import CharacterError
+from msgs_config.file_kinds import root_tag
 
 SUFFIXES = (".xml", ".mjcf")
 _ROOT = "mujoco"
@@ -50,8 +51,8 @@ def is_mjcf(path: Path) -> bool:
     """
     if path.suffix.lower() not in SUFFIXES or not path.is_file():
         return False
-    text = files.read_xml(path, CharacterError).text
-    return files.parse_xml(path, text, CharacterError).tag == _ROOT
+    # MuJoCo reads files that are not quite XML
+    return root_tag(files.read_xml(path, CharacterError).text) == _ROOT
 
 
 def compile_mjcf(path: Path) -> CompiledMjcf:
@@ -159,11 +160,20 @@ def _weighs(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:
     """Whether the inertia of a body follows from this shape."""
     body, compiler = geom.parent, spec.compiler
     always = compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    if (body.explicitinertial and not always) or body.name == "world":
+    if (body.explicitinertial and not always) or not _moves(body):
         return False
     least, most = compiler.inertiagrouprange
     mass = geom.density if math.isnan(geom.mass) else geom.mass
     return bool(mass) and least <= geom.group <= most
+
+
+def _moves(body: mujoco.MjsBody) -> bool:
+    """Whether a joint moves a body, or one that it is fixed to."""
+    while body is not None and body.name != "world":
+        if body.joints:
+            return True
+        body = body.parent
+    return False
 
 
 def _make_ball(geom: mujoco.MjsGeom) -> None:

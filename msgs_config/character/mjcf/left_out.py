@@ -1,7 +1,7 @@
 """What of an MJCF file no character has: a line for each kind, which names what there is."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -71,16 +71,13 @@ def _remark_base(model: mujoco.MjModel, robot: Robot, add: Callable[[str, str], 
     for joint in range(model.njnt):
         if model.jnt_bodyid[joint] == robot.bodies[0]:
             dofs = slice(int(model.jnt_dofadr[joint]), int(model.jnt_dofadr[joint]) + 6)
-    for kind in ("damping", "armature", "frictionloss"):
+    for kind in ("damping", "frictionloss"):
         if np.any(getattr(model, f"dof_{kind}")[dofs]):
             add(f"{kind} of a floating base", robot.links[robot.bodies[0]])
 
 
-def remark_elements(mjcf: CompiledMjcf, root: ElementTree.Element) -> Iterator[LeftOut]:
-    """A line for each kind of element that nothing here stands for.
-
-    `root` is that of the file, without what it includes.
-    """
+def remark_elements(mjcf: CompiledMjcf) -> Iterator[LeftOut]:
+    """A line for each kind of element that nothing here stands for."""
     spec, model = mjcf.spec, mjcf.model
     for kind, plural in _PLURALS.items():
         yield from _elements(kind, [each.name for each in getattr(spec, plural)])
@@ -102,8 +99,9 @@ def remark_elements(mjcf: CompiledMjcf, root: ElementTree.Element) -> Iterator[L
             "option",
             f"left out: <option>, for which parameters of sim_node stand: {', '.join(others)}",
         )
+    text = mjcf.path.read_text(errors="replace")  # without what it includes
     for kind in _OF_PICTURES:
-        if root.find(kind) is not None:
+        if re.search(rf"<{kind}[ >/]", text):
             yield LeftOut(kind, f"left out: <{kind}>")
 
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import ROOT, JointType
 from msgs_config.character.mjcf.actuators import Drive, read_drives, remark_actuators
@@ -18,7 +17,6 @@ from msgs_config.character.mjcf.sensors import read_sensors, remark_sensors
 from msgs_config.character.mjcf.shapes import remark_shapes
 from msgs_config.character.mjcf.urdf import write_urdf
 from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
-from msgs_config.errors import CharacterError
 from msgs_config.geometry import rotations
 
 HOME = "home"
@@ -42,7 +40,6 @@ def read_mjcf(path: Path) -> MjcfCharacter:
     Raises:
         CharacterError: MuJoCo refuses it, or it has nothing that moves; names the file.
     """
-    root = files.parse_xml(path, files.read_xml(path, CharacterError).text, CharacterError)
     mjcf = compile_mjcf(path)
     robot = find_robot(mjcf)
     drives, followers = read_drives(mjcf, robot), read_followers(mjcf, robot)
@@ -52,6 +49,7 @@ def read_mjcf(path: Path) -> MjcfCharacter:
         "rest_pose": _rest_pose(mjcf.model, robot, positions, set(followers)),
         "joints": _joints(mjcf.model, robot, drives, set(followers)),
         "sensors": read_sensors(mjcf, robot),
+        "root_armature": _root_armature(mjcf.model, robot),
     }
     remarks = (
         *mjcf.remarks,
@@ -62,11 +60,15 @@ def read_mjcf(path: Path) -> MjcfCharacter:
         *remark_actuators(mjcf, robot),
         *remark_sensors(mjcf, robot),
         *_remark_keys(mjcf.model, home),
-        *remark_elements(mjcf, root),
+        *remark_elements(mjcf),
     )
     return MjcfCharacter(
         write_urdf(mjcf, robot, drives, followers),
-        {key: value for key, value in content.items() if value not in ({}, [])},
+        {
+            key: value
+            for key, value in content.items()
+            if value not in ({}, 0.0) or key == "fixed_base"
+        },
         remarks,
     )
 
@@ -111,6 +113,13 @@ def _rest_pose(
                 value = float(np.clip(value, *model.jnt_range[joint]))
             pose |= _named(name, JointType.REVOLUTE, [value])
     return pose
+
+
+def _root_armature(model: mujoco.MjModel, robot: Robot) -> float:
+    """The armature of a floating base, kg and kg m^2, which a default may have given it."""
+    if not robot.floats:
+        return 0.0
+    return float(model.dof_armature[model.body_dofadr[robot.bodies[0]]])
 
 
 def _vector(quaternion_wxyz: FloatArray) -> list[float]:
