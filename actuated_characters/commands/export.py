@@ -1,5 +1,5 @@
 """The command `actuated_characters export`: a run, a bag or a clip as CSV, BVH or glTF; a policy as
-ONNX.
+ONNX; a character as MJCF.
 """
 
 import argparse
@@ -25,14 +25,16 @@ if TYPE_CHECKING:  # it takes a while to import
     from character_motion.export.trajectories import Trajectories
     from msgs_config.arrays import FloatArray
 
-_CSV, _BVH, _GLTF, _ONNX = "CSV", "BVH", "glTF", "ONNX"
+_CSV, _BVH, _GLTF, _ONNX, _MJCF = "CSV", "BVH", "glTF", "ONNX", "MJCF"
 _BINARY = ".glb"
 _FORMATS = {".csv": _CSV, ".bvh": _BVH, _BINARY: _GLTF, ".gltf": _GLTF, ".onnx": _ONNX}
+_FORMATS[".xml"] = _MJCF
 _KNOWN_TO = {  # the formats of options that not every format has
     "reference": (_CSV,),
     **dict.fromkeys(("topic", "base"), (_CSV, _BVH, _GLTF)),
     **dict.fromkeys(("from", "to", "fps"), (_BVH, _GLTF)),
     **dict.fromkeys(("units", "order"), (_BVH,)),
+    "servos": (_MJCF,),
     **dict.fromkeys(("ground", "shapes", "skin", "skin-map"), (_GLTF,)),
 }
 _CENTIMETRES = 100.0  # in a metre
@@ -45,7 +47,7 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         commands,
         _export,
         "export",
-        "write a run, a bag or a clip as CSV, BVH or glTF, or a policy as ONNX",
+        "write a run, a bag or a clip as CSV, BVH or glTF, a policy as ONNX, a character as MJCF",
         "Write a recorded run or a clip as the suffix of --output says. .csv has one row a state: "
         "time_s (since the first state), stamp_ns, episode (from 1), then position.DOF (rad or "
         "m), velocity.DOF (rad/s or m/s) and effort.DOF (N m or N, applied in the tick before the "
@@ -53,12 +55,14 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         "of a clip time_s and positions. .bvh is the skeleton of one character; .glb (binary) and "
         ".gltf (text) are all characters as `render` draws them, and thrown balls. Both "
         "are y up, forward is z. .onnx is a trained policy for other runtimes, with joint names, "
-        "gains and scales in its metadata (docs/policies.md).",
+        "gains and scales in its metadata (docs/policies.md). .xml is a character as a model of "
+        "MuJoCo (docs/mjcf.md).",
         [
             "export runs/demo --output demo.csv",
             "export runs/demo --output demo.glb",
             "export walk --output walk.bvh --units cm",
             "export walk --output walk.onnx",
+            "export humanoid --output humanoid.xml",
             "export walk --skin body.glb --output body_walk.glb",
             "export runs/demo --topic description_joint_states --output robot.glb",
         ],
@@ -67,7 +71,7 @@ def add_export(commands: "Commands[argparse.ArgumentParser]") -> None:
         "source",
         metavar="SOURCE",
         help="a run's directory, a bag, or a clip: its name, or a .txt or .json file; for ONNX a "
-        "policy: its name, or a file of `train`",
+        "policy: its name, or a file of `train`; for MJCF a character: its name or file",
     )
     export.add_argument(
         "--output", type=Path, required=True, metavar="FILE", help=f"a {_suffixes()} file"
@@ -99,6 +103,11 @@ def _add_options_of_formats(export: argparse.ArgumentParser) -> None:
     )
     export.add_argument("--units", choices=("m", "cm"), help="BVH: unit of length (m)")
     export.add_argument("--order", choices=_ORDERS, help="BVH: order of rotation channels (ZXY)")
+    export.add_argument(
+        "--servos",
+        action="store_true",
+        help="MJCF: actuators are servos with the character's gains, not motors",
+    )
     export.add_argument("--ground", action="store_true", help="glTF: the plane z = 0, too")
     export.add_argument(
         "--shapes",
@@ -124,7 +133,7 @@ def _export(options: argparse.Namespace) -> None:
                 f"--{name} is of {' and '.join(kinds)}; {options.output} is none"
             )
     _check_output(options.output, overwrite=options.overwrite)
-    writers = {_CSV: _write_table, _ONNX: _write_policy}
+    writers = {_CSV: _write_table, _ONNX: _write_policy, _MJCF: _write_character}
     writers.get(kind, _write_motion)(options, kind)
 
 
@@ -176,6 +185,17 @@ def _write_policy(options: argparse.Namespace, kind: str) -> None:
         for end in (*model.graph.input, *model.graph.output)
     ]
     print(f"{options.output}: {', '.join(sizes)}")
+
+
+def _write_character(options: argparse.Namespace, kind: str) -> None:
+    from msgs_config.character.loading import load_character
+    from msgs_config.character.mjcf.writing import write_mjcf
+
+    if options.character is not None:
+        raise ConfigurationError(f"--character: of {kind} SOURCE is the character")
+    written = write_mjcf(load_character(options.source), servos=options.servos)
+    write_whole(options.output, written.text.encode())
+    print(options.output, *written.left_out, sep="\n")
 
 
 def _write_motion(options: argparse.Namespace, kind: str) -> None:
