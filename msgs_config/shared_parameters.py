@@ -16,7 +16,8 @@ class CharacterSource(Settings):
     """Which character it is, and where it stands; all other parameters depend on these."""
 
     character: str = parameter(
-        DEFAULT_CHARACTER, "name of a shipped character, or path of a .yaml, .urdf or .xacro file"
+        DEFAULT_CHARACTER,
+        "name of a shipped character, or path of a .yaml, .urdf, .xacro or .xml file",
     )
     collision: str = parameter(
         FROM_FILE,

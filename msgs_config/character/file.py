@@ -97,7 +97,7 @@ def character_path(name_or_path: str) -> Path:
         kinds = (*YAML_SUFFIXES, *URDF_SUFFIXES)
         refuse_other_kind(Path(name_or_path), CHARACTER_FILE, kinds, CharacterError)
         sentence = one_of("character", name_or_path, shipped_characters())
-        raise CharacterError(f"{sentence}, or the path of a .yaml, .urdf or .xacro file")
+        raise CharacterError(f"{sentence}, or the path of a .yaml, .urdf, .xacro or .xml file")
     return path
 
 

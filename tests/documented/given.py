@@ -12,6 +12,7 @@ from tests.documented.collecting import ROOT
 from tests.support.capture_makers import MAKERS as CAPTURE_MAKERS
 from tests.support.captures import capture
 from tests.support.hinged_humanoid import write_robot
+from tests.support.mjcf import FILES, write_mjcf
 from tests.support.networks import QUADRUPED_SIZE, Mlp
 from tests.support.skins import skinned_glb
 
@@ -74,6 +75,10 @@ def _takes(path: Path) -> None:
 
 def _robot(path: Path) -> None:
     write_robot(path)
+
+
+def _mjcf(path: Path) -> None:
+    write_mjcf(path.parent, FILES["several joints on one body"], name=path.name)
 
 
 def _robots(path: Path) -> None:
@@ -151,6 +156,7 @@ MAKERS: dict[str, Callable[[Path], None]] = {
     "reconstructed.json": _copy_of("tests/data/walk_reconstructed.json"),
     "trained.npz": _copy_of("controller_node/planner/policy/shipped/walk.npz"),
     "robot.urdf": _robot,
+    "robot.xml": _mjcf,
     "robots": _robots,
     "my_machine.yaml": _copy_of("controller_node/behaviours/state_machine/data/walk.yaml"),
     "my_policy.onnx": _policy,

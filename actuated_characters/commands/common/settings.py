@@ -85,7 +85,7 @@ def add_character(
         "--character",
         default=default,
         metavar="NAME",
-        help=f"name, or path of a .yaml, .urdf or .xacro file ({about})",
+        help=f"name, or path of a .yaml, .urdf, .xacro or .xml file ({about})",
     )
 
 

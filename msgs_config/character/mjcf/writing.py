@@ -54,8 +54,8 @@ def write_mjcf(character: Character, *, servos: bool = False) -> Written:
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     assets, world = (ElementTree.SubElement(root, tag) for tag in ("asset", "worldbody"))
     ElementTree.SubElement(world, "light", pos="0 0 4", dir="0 0 -1", directional="true")
-    floor = {"type": "plane", "size": "0 0 1", "conaffinity": "0"}
-    ElementTree.SubElement(world, "geom", name="floor", **floor)
+    floor = {"name": "floor", "type": "plane", "size": "0 0 1", "conaffinity": "0"}
+    ElementTree.SubElement(world, "geom", floor)
     unread: list[str] = []
     bodies = _add_bodies(character, world, assets, unread)
     _add_frames(character, bodies)
@@ -207,20 +207,20 @@ def _add_actuators(character: Character, root: ElementTree.Element, *, servos: b
         if joint.type is JointType.FLOATING or joint.mimic is not None or not joint.effort_limit:
             continue
         limit, gains = joint.effort_limit, character.gains[joint.name]
-        bounds = {}
+        named, bounds = {"name": joint.name, "joint": joint.name}, dict[str, str]()
         is_servo = servos and joint.type is not JointType.SPHERICAL and gains.stiffness > 0.0
         if math.isfinite(limit):
             name = "forcerange" if is_servo else "ctrlrange"
             bounds[name] = write_numbers((-limit, limit))
         if is_servo:
             own = {"kp": repr(gains.stiffness), "kv": repr(gains.damping), **bounds}
-            ElementTree.SubElement(actuator, "position", name=joint.name, joint=joint.name, **own)
+            ElementTree.SubElement(actuator, "position", named | own)
         elif joint.type is JointType.SPHERICAL:
             for axis, gear in _AXES.items():
-                named = {"name": f"{joint.name}_{axis}", "joint": joint.name, "gear": gear}
-                ElementTree.SubElement(actuator, "motor", named | bounds)
+                own = {"name": f"{joint.name}_{axis}", "joint": joint.name, "gear": gear}
+                ElementTree.SubElement(actuator, "motor", own | bounds)
         else:
-            ElementTree.SubElement(actuator, "motor", name=joint.name, joint=joint.name, **bounds)
+            ElementTree.SubElement(actuator, "motor", named | bounds)
 
 
 def _add_sensors(
@@ -237,8 +237,9 @@ def _add_sensors(
             continue
         for kind in ("accelerometer", "gyro"):
             ElementTree.SubElement(element, kind, name=f"{sensor.name}_{kind}", site=sensor.name)
-        turn = {"objtype": "site", "objname": sensor.name}
-        ElementTree.SubElement(element, "framequat", name=f"{sensor.name}_orientation", **turn)
+        name = f"{sensor.name}_orientation"
+        turn = {"name": name, "objtype": "site", "objname": sensor.name}
+        ElementTree.SubElement(element, "framequat", turn)
 
 
 def _add_rest_pose(character: Character, root: ElementTree.Element) -> None:

@@ -89,7 +89,7 @@ def test_it_may_lie_in_a_package() -> None:
         ("a\0.urdf", "must be a path"),
         ("a\0.yaml", "not a text file"),
         ("arm.xacro", "No such file"),
-        ("arm.txt", "or the path of a .yaml, .urdf or .xacro file"),
+        ("arm.txt", "or the path of a .yaml, .urdf, .xacro or .xml file"),
     ],
 )
 def test_one_that_is_not_there_is_refused(name: str, words: str) -> None:

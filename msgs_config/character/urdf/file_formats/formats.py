@@ -10,7 +10,9 @@ URDF_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 """Of files that a URDF, or an MJCF in its place, may be in, in lower case."""
 YAML_SUFFIXES = (".yaml", ".yml")
 
-CHARACTER_FILE = "a character, which is a .urdf or .xacro file, or a .yaml file that names one"
+CHARACTER_FILE = (
+    "a character, which is a .urdf, .xacro or .xml file, or a .yaml file that names one"
+)
 _XACRO_SPACE = "xacro"  # is in every address under which xacro's name space is declared
 
 
