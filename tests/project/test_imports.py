@@ -25,6 +25,10 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
     "pybullet": {"sim_node/physics/bullet/client.py"},
     "mujoco": {
         "msgs_config/character/dynamics.py",
+        *(f"msgs_config/character/mjcf/{name}.py" for name in ("actuators", "compiling")),
+        *(f"msgs_config/character/mjcf/{name}.py" for name in ("followers", "left_out", "places")),
+        *(f"msgs_config/character/mjcf/{name}.py" for name in ("reading", "robot", "sensors")),
+        *(f"msgs_config/character/mjcf/{name}.py" for name in ("shapes", "urdf")),
         "msgs_config/character/mujoco_model.py",
         "msgs_config/character/mujoco_world.py",
         "msgs_config/compiled/data_layout.py",
