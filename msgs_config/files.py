@@ -3,6 +3,7 @@
 import codecs
 import importlib.util
 import re
+import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from copy import deepcopy
@@ -27,7 +28,8 @@ MAX_XML_NESTING = MAX_YAML_NESTING = 64  # levels
 _PACKAGE = "package://"
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 _REMEDIES = {
-    "pybullet_data": "; it comes with PyBullet, and alone by: python -m msgs_config.fetch_robots"
+    "pybullet_data": "; it comes with PyBullet, and alone by: "
+    f"{sys.executable} -m msgs_config.fetch_robots"
 }
 """By the package's name, how to get one that the shipped characters' files name."""
 _LFS_POINTER_BYTES = 1024  # a pointer is smaller than that, by its specification

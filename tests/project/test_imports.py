@@ -162,7 +162,6 @@ def test_both_package_files_have_one_version_and_one_licence() -> None:
 
     assert package_xml().findtext("version") == ast.literal_eval(arguments["version"])
     assert package_xml().findtext("license") == ast.literal_eval(arguments["license"])
-    assert package_xml().findtext("maintainer") == ast.literal_eval(arguments["maintainer"])
 
 
 def test_every_ros_package_that_is_imported_is_a_dependency() -> None:
