@@ -3,18 +3,24 @@
 import email
 import os
 import re
+import runpy
+import shlex
 import shutil
 import subprocess
 import sys
 import tarfile
 import venv
 import zipfile
+from collections.abc import Iterable
 from email.message import Message
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+import setuptools
+import yaml
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "actuated_characters"
@@ -24,7 +30,9 @@ ALONE = {"LICENSE", "README.md", "package.xml", "pyproject.toml", "setup.cfg", "
 MADE = {"PKG-INFO", f"{PACKAGE}.egg-info"}
 SCRIPTS = {"sim_node", "controller_node", "recorder", "viewer", "composed", PACKAGE}
 DESCRIPTION = ElementTree.parse(ROOT / "package.xml")
-PLACEHOLDER = ".invalid"
+MAINTAINER = DESCRIPTION.find("maintainer")
+ADDRESS = DESCRIPTION.findtext("url[@type='repository']") or ""
+WRITTEN = "URL" if ".invalid/" in ADDRESS else ADDRESS  # in pages
 BUILD = """
 import sys
 from setuptools import build_meta
@@ -76,6 +84,67 @@ def metadata(wheel: Path) -> Message:
         return email.message_from_bytes(archive.read(name))
 
 
+def test_pages_have_the_address_of_the_description() -> None:
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    commands = {
+        (page.name, address)
+        for page in pages
+        if page.name != "documented.md"  # which is made from the others
+        for address in re.findall(r"(?:git clone |git\+)([^\s\"'`]+)", page.read_text("utf-8"))
+    }
+
+    assert {name for name, _ in commands} >= {"README.md", "install.md", "ros.md"}
+    assert [each for each in sorted(commands) if each[1] != WRITTEN] == []
+
+
+def test_the_citation_and_the_entry_for_the_index_are_those_of_the_description() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+    page = (ROOT / "docs/release.md").read_text("utf-8")
+    (entry,) = re.findall(r"```yaml\n(.*?)```", page, flags=re.DOTALL)
+    (repository,) = yaml.safe_load(entry).values()
+
+    assert MAINTAINER is not None
+    assert citation["authors"] == [{"name": MAINTAINER.text}]
+    assert citation["version"] == DESCRIPTION.findtext("version")
+    assert {repository["doc"]["url"], repository["source"]["url"]} == {ADDRESS}
+
+
+def test_the_first_version_of_the_changelog_is_that_of_the_description() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    versions = re.findall(r"^## \[(.*?)\](.*)$", changelog, flags=re.MULTILINE)
+
+    assert versions[0] == ("Unreleased", "")
+    assert versions[1][0] == DESCRIPTION.findtext("version")
+    assert re.fullmatch(r" - \d{4}-\d\d-\d\d", versions[1][1])
+
+
+@pytest.mark.parametrize(
+    "file", ["docs/ros.md", "docker/Dockerfile", ".github/workflows/jazzy.yml"]
+)
+def test_what_a_ros_install_takes_from_pip_is_what_the_package_requires(file: str) -> None:
+    """All but what a ROS install has, and what comes with another one of them."""
+    given: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        patch.setattr(setuptools, "setup", lambda **settings: given.update(settings))
+        runpy.run_path(str(ROOT / "setup.py"))
+    required = _by_name(given["install_requires"])
+    known = required | _by_name(given["extras_require"]["view"])
+    text = (ROOT / file).read_text("utf-8").replace("\\\n", " ")
+    (words,) = re.findall(r"pip install (?:--no-cache-dir )?(colcon-.*)", text)
+    taken = _by_name(shlex.split(words))
+
+    assert required.keys() - taken.keys() <= {
+        *("llvmlite", "lz4", "numpy", "pillow", "pybullet", "PyYAML"),
+    }
+    others = {name: each for name, each in taken.items() if each not in (name, known.get(name))}
+    assert others == {"setuptools": "setuptools<80"}
+
+
+def _by_name(requirements: Iterable[str]) -> dict[str, str]:
+    return {re.split(r"[<>=]", each)[0]: each for each in requirements}
+
+
 @pytest.mark.slow
 def test_an_sdist_has_all_that_runs_and_nothing_else(sdist: Path) -> None:
     with tarfile.open(sdist) as archive:
@@ -107,12 +176,11 @@ def test_a_wheel_has_all_that_runs_and_nothing_else(wheel: Path) -> None:
 @pytest.mark.slow
 def test_a_wheel_says_what_the_description_of_the_package_says(wheel: Path) -> None:
     said = metadata(wheel)
-    maintainer = DESCRIPTION.find("maintainer")
 
-    assert maintainer is not None
-    assert said["Maintainer"] == maintainer.text
-    assert said["Maintainer-email"] == maintainer.get("email")
-    assert said["Home-page"] == DESCRIPTION.findtext("url")
+    assert MAINTAINER is not None
+    assert said["Maintainer"] == MAINTAINER.text
+    assert said["Maintainer-email"] == MAINTAINER.get("email")
+    assert said["Home-page"] == ADDRESS
     assert said["Version"] == DESCRIPTION.findtext("version")
     assert {"wheels", "view"} <= set(said.get_all("Provides-Extra", ()))
     text = str(said.get_payload())
@@ -145,6 +213,8 @@ def test_an_empty_environment_installs_it_and_runs_as_the_clone_does(
 
     call(programs / "pip", "install", "-qq", f"{archive}{extra}")
     assert {path.name for path in programs.iterdir()} >= SCRIPTS
+    shared = tmp_path / "venv/share" / PACKAGE
+    assert [name for name in tracked(*SHARED) if not (shared / name).is_file()] == []
     call(programs / "python", "-m", "msgs_config.fetch_robots")
     run = ("run", "--clip", "walk", "--duration", "0.5", "--output")
     call(programs / PACKAGE, *run, "installed", *([] if extra else ["--in-process"]))
