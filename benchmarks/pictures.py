@@ -17,6 +17,7 @@ from rich.progress import track
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.recorder.run_directory import prepare_directory
 from actuated_characters.render.engine.renderer import Picture
+from actuated_characters.render.films import write_film
 from actuated_characters.render.movie import GhostPlace, Movie, MovieSettings
 from actuated_characters.render.stills import pose_strip
 from actuated_characters.runs.in_process import run_in_process
@@ -62,9 +63,13 @@ def main() -> int:
     for name in track(wanted, "moving pictures", console=console):
         size, runs = MOVING[name]
         pictures = [each for run in runs for each in draw_movie(simulate(*run), size)]
-        write(pictures, options.folder / name)
+        write_film(options.folder / name, pictures, len(pictures), size, FRAMES_A_SECOND)
     if options.only in (None, GAINS):
-        write(film_gains(), options.folder / GAINS)
+        pictures = film_gains()
+        height, width, _ = pictures[0].shape
+        write_film(
+            options.folder / GAINS, pictures, len(pictures), (width, height), FRAMES_A_SECOND
+        )
     return 0
 
 
@@ -103,15 +108,6 @@ def draw_movie(run: Recording, size: tuple[int, int]) -> list[Picture]:
     end = float(run.times[-2])  # nothing answers the last state
     settings = MovieSettings(fps=FRAMES_A_SECOND, end=end, size=size, ghost=GhostPlace.OVER)
     return list(Movie([run], settings).pictures())
-
-
-def write(pictures: list[Picture], file: Path) -> None:
-    """Write a moving picture that a page shows as it is."""
-    first, *others = map(Image.fromarray, pictures)
-    period_ms = round(1000 / FRAMES_A_SECOND)
-    first.save(
-        file, save_all=True, append_images=others, duration=period_ms, loop=0, quality=45, method=4
-    )
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:  # they take a second to import
 _COUNT = 8
 _MAX_PICTURES = 10_000
 _FPS = 30
-_MOVIE = ".mp4"
+_MOVIES = (".mp4", ".webp")  # those of `write_film`
 _GHOSTS = ("beside", "over", "none")
 _STRIP_OPTIONS = ("times", "count", "columns")
 _MOVIE_OPTIONS = ("fps", "speed", "contacts", "workers")
@@ -30,9 +31,10 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "render",
         help="draw pictures or a movie of a recorded run",
         description="Draw a recorded run as pictures side by side, in one PNG file; with --video "
-        "or an --output that ends in .mp4, as a movie. Arrows are pushes.",
+        "or an --output that ends in .mp4 or .webp (for pages), as a movie. Arrows are pushes.",
         epilog="examples: actuated_characters render runs/demo --times 0,0.5,1 --ghost over; "
         "actuated_characters render runs/demo --video --speed 0.25 --from 1 --to 3; "
+        "actuated_characters render runs/demo --output demo.webp --to 2 --fps 20 --size 480x270; "
         "actuated_characters render runs/demo --skin body.glb; "
         "actuated_characters render runs/demo --topic description_joint_states",
     )
@@ -72,7 +74,7 @@ def add_render(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def _render(options: argparse.Namespace) -> None:
     is_movie = options.video or (
-        options.output is not None and options.output.suffix.lower() == _MOVIE
+        options.output is not None and options.output.suffix.lower() in _MOVIES
     )
     _check(options, is_movie)
     if is_movie:
@@ -109,7 +111,7 @@ def _render_strip(options: argparse.Namespace) -> None:
 
     skin = given_skin(options)
     recordings = _read(options)
-    output = _output(options, STRIP)
+    output = _output(options, STRIP, (Path(STRIP).suffix,))
     count = times if isinstance(times, int) else len(times)
     with progress_bar(recordings[0].character.name, count, "pictures") as bar:
         picture = strip(
@@ -132,8 +134,8 @@ def _render_movie(options: argparse.Namespace) -> None:
     size = None if options.size is None else _size(options.size)
     ghost = "over" if options.reference else options.ghost
     from actuated_characters.recorder.run_directory import VIDEO
+    from actuated_characters.render.films import check_film
     from actuated_characters.render.movie import MOVIE_SIZE, GhostPlace, Movie, MovieSettings
-    from actuated_characters.render.video import check_video
 
     settings = MovieSettings(
         fps=_FPS if options.fps is None else options.fps,
@@ -147,9 +149,9 @@ def _render_movie(options: argparse.Namespace) -> None:
         skin=given_skin(options),
         workers=options.workers,
     )
-    check_video(settings.size, settings.fps)
+    output = _output(options, VIDEO, _MOVIES)
+    check_film(output, 0, settings.size, settings.fps)
     recordings = _read(options)
-    output = _output(options, VIDEO)
     movie = Movie(recordings, settings)
     with progress_bar(output.name, len(movie), "pictures") as bar:
         movie.save(output, lambda done: bar.update(bar.task_ids[0], completed=done))
@@ -181,13 +183,12 @@ def _size(text: str) -> "Size":
     return int(match[1]), int(match[2])
 
 
-def _output(options: argparse.Namespace, name: str) -> Path:
+def _output(options: argparse.Namespace, name: str, suffixes: Sequence[str]) -> Path:
     """The file to write, by default beside a run's bag; checked before all the work."""
     folder = options.run if options.run.is_dir() else options.run.parent  # a bag may be a file
     output: Path = options.output or folder / name
-    suffix = Path(name).suffix
-    if output.suffix.lower() != suffix:
-        raise ConfigurationError(f"--output {output}: it must be a {suffix} file")
+    if output.suffix.lower() not in suffixes:
+        raise ConfigurationError(f"--output {output}: it must be a {' or '.join(suffixes)} file")
     if output.is_dir() or not output.absolute().parent.is_dir():
         reason = "it is a directory" if output.is_dir() else "its directory does not exist"
         raise ConfigurationError(f"--output {output}: {reason}")

@@ -24,10 +24,10 @@ from actuated_characters.render.engine.camera_pose import (
 )
 from actuated_characters.render.engine.posed_characters import PosedCharacters, root_path
 from actuated_characters.render.engine.renderer import FrameSpec, Picture
+from actuated_characters.render.films import check_film, write_film
 from actuated_characters.render.scene import RecordedScene, make_scene, part_of
 from actuated_characters.render.skin.given import GivenSkin
 from actuated_characters.render.stills import LONGEST_ARROW, Progress, check_size
-from actuated_characters.render.video import check_video, write_video
 from msgs_config.arrays import FloatArray, IntArray
 from msgs_config.clips.nearest_rows import nearest_rows
 from msgs_config.errors import ConfigurationError, RecordingError
@@ -129,16 +129,16 @@ class Movie:
         return draw(stays, self._frames, most)
 
     def save(self, path: Path, progress: Progress | None = None) -> None:
-        """Write an MP4 file, whole or not at all; `progress` is told the pictures so far.
+        """Write a film, whole or not at all; `progress` is told the pictures so far.
 
         Raises:
-            ConfigurationError, RecordingError: see `write_video`.
+            ConfigurationError, RecordingError: see `write_film`.
         """
         settings = self._settings
-        check_video(settings.size, settings.fps)
+        check_film(path, len(self), settings.size, settings.fps)
         with closing(self.pictures()) as pictures:
             counted = pictures if progress is None else _counted(pictures, progress)
-            write_video(path, counted, settings.size, settings.fps)
+            write_film(path, counted, len(self), settings.size, settings.fps)
 
     def _with_views(self, frames: Sequence[FrameSpec]) -> list[FrameSpec]:
         """The frames with their views, the places of their ghosts and the length of arrows."""

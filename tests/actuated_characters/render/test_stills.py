@@ -8,6 +8,7 @@ import av
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image, ImageSequence
 
 from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.cli import main
@@ -301,6 +302,36 @@ def test_render_writes_a_film_into_the_runs_directory(
     (run / "video.mp4").unlink()
 
 
+def test_render_writes_an_animation_for_pages(
+    run: Path, own_handlers: None, recording: Recording, tmp_path: Path
+) -> None:
+    file = tmp_path / "film.webp"
+    film = ["--size", "97x65", "--fps", "30", "--from", "0.1", "--workers", "1"]
+
+    assert main(["render", str(run), "--output", str(file), *film]) == 0
+
+    pictures = Movie([recording], MovieSettings(30, start=0.1, size=(97, 65), workers=1)).pictures()
+    with Image.open(file) as opened:
+        frames, ends = [], []
+        for frame in ImageSequence.Iterator(opened):
+            frames.append(np.asarray(frame.convert("RGB")).astype(int))
+            ends.append(frame.info["timestamp"] + frame.info["duration"])
+    assert ends == [33, 67, 100, 133, 167]  # ms: 30 a second in the long run
+    for frame, picture in zip(frames, pictures, strict=True):
+        assert np.abs(frame - picture).mean() < 8.0
+
+
+def test_an_animation_that_would_not_fit_into_memory_is_refused(
+    recording: Recording, tmp_path: Path
+) -> None:
+    movie = Movie([recording], MovieSettings(fps=100, speed=0.01, size=(1920, 1080)))
+
+    with pytest.raises(ConfigurationError, match=r"a \.webp may have 172: .*\.mp4"):
+        movie.save(tmp_path / "film.webp")
+
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
@@ -346,7 +377,9 @@ def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
         (["--ghost", "beside"], "a strip has it over, or none"),
         (["--times", "0", "--count", "1"], "give one of the two"),
         (["--reference", "--ghost", "none"], "--reference is --ghost over; --ghost is none"),
-        (["--video", "--output", "x.png"], "must be a .mp4 file"),
+        (["--video", "--output", "x.png"], "must be a .mp4 or .webp file"),
+        (["--output", "x.webp", "--fps", "101"], "101 frames a second; it must be 1 to 100"),
+        (["--output", "x.webp", "--count", "3"], "--count is a strip's, and this is a movie"),
         (["--video", "--from", "0.3"], "from 0.3 s to 0.25 s is not in the recording"),
         (["--video", "--size", "61x80"], "both must be even, such as 62x80"),
         (["--video", "--fps", "0"], "0 frames a second"),
