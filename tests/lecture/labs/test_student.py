@@ -189,7 +189,7 @@ def test_the_command_writes_a_stub_and_grades_it(tmp_path: Path) -> None:
 
     assert written.returncode == 0 and file.is_file()
     assert (again.returncode, again.stderr) == (
-        2,
+        1,
         f"error: {file} exists; --stub writes a new file\n",
     )
     assert nothing.returncode == 1 and "which file?" in nothing.stderr
