@@ -20,6 +20,7 @@ SHARED = {
     "launch": "*.launch.py",
     "config": "*.*",
     "examples": "*.*",
+    "examples/terrains": "*",
     "examples/trials": "*",
     "examples/without_rclpy": "*",
 }

@@ -28,7 +28,15 @@ FOLDERS = ("msgs_config", "sim_node", "controller_node", "character_motion", PAC
 SHARED = ("config", "examples", "launch")
 ALONE = {"LICENSE", "README.md", "package.xml", "pyproject.toml", "setup.cfg", "setup.py"}
 MADE = {"PKG-INFO", f"{PACKAGE}.egg-info"}
-SCRIPTS = {"sim_node", "controller_node", "recorder", "viewer", "composed", PACKAGE}
+SCRIPTS = {
+    "sim_node",
+    "controller_node",
+    "recorder",
+    "viewer",
+    "composed",
+    "ros2_control_bridge",
+    PACKAGE,
+}
 DESCRIPTION = ElementTree.parse(ROOT / "package.xml")
 MAINTAINER = DESCRIPTION.find("maintainer")
 ADDRESS = DESCRIPTION.findtext("url[@type='repository']") or ""
