@@ -75,7 +75,7 @@ setup(
             "viewer/editor/time_edits.*s",
             "viewer/recorded/time_bar.*s",
         ],
-        "lecture": ["labs/stubs/*.py"],
+        "lecture": ["labs/stubs/*.py", "labs/bodies/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),

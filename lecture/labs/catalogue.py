@@ -12,6 +12,7 @@ LABS = {
     "lab2": "stable_pd",
     "lab3": "balance",
     "lab4": "simbicon",
+    "lab5": "samcon",
     "lab6": "planner",
 }
 _STUBS = Path(__file__).parent / "stubs"

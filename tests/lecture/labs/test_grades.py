@@ -16,6 +16,7 @@ HASHES = {
     "lab2": "d0e77e177b008939",
     "lab3": "edb099942b53f131",
     "lab4": "2ac6ffa90f4ec9c6",
+    "lab5": "aba2382d0bdf1469",
     "lab6": "4858bdd400683198",
 }
 
@@ -49,6 +50,16 @@ WRONG = [
         30,
     ),
     ("lab4", "the swing leg's sign", (("-torso - swing", "-torso + swing"),), 30),
+    ("lab5", "no samples", (("+ spread *", "+ 0.0 *"),), 40),
+    (
+        "lab5",
+        "the joints alone cost",
+        (("+ 3.0 * (foot**2).sum(axis=1) + 3.0 * trunk**2 + balance", ""),),
+        40,
+    ),
+    ("lab5", "the best alone survives", (("* good // int(count)", "* 0"),), 30),
+    ("lab5", "the best few survive", (("* good // int(count)", ""),), 50),
+    ("lab5", "a path that is not traced", (("row[samples[-1]]", "samples[-1]"),), 40),
     (
         "lab6",
         "the dearest plans count",
