@@ -36,7 +36,7 @@ def terrain_urdf(path: Path, text: str) -> str:
         for kind, (keys, read) in _KINDS.items()
         for each in _items(reader, kind, keys)
     }
-    count = sum(map(len, pieces.values()))
+    count = len([block for blocks in pieces.values() for block in blocks])
     if count > _MOST_BLOCKS:
         raise CharacterError(f"{path}: these are {count:,} boxes; there may be {_MOST_BLOCKS:,}")
     has_plane = reader.choice("ground", _GROUND) == "plane"

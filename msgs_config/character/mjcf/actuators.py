@@ -15,6 +15,7 @@ import numpy as np
 from msgs_config.character.mjcf.compiling import CompiledMjcf
 from msgs_config.character.mjcf.robot import Robot
 from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
+from msgs_config.geometry import fixed_order
 
 _OF_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _FIXED_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED)
@@ -43,7 +44,7 @@ def read_drives(mjcf: CompiledMjcf, robot: Robot) -> dict[int, Drive]:
         joint = _joint_of(model, actuator)
         if joint not in drives:
             continue
-        drive, gear = drives[joint], float(np.linalg.norm(model.actuator_gear[actuator, :3]))
+        drive, gear = drives[joint], float(fixed_order.norm(model.actuator_gear[actuator, :3]))
         if model.jnt_type[joint] != _BALL:
             gear = abs(float(model.actuator_gear[actuator, 0]))
         drive.is_driven = True
@@ -56,8 +57,8 @@ def read_drives(mjcf: CompiledMjcf, robot: Robot) -> dict[int, Drive]:
                 drive.stiffness += max(-float(bias[1]), 0.0)
                 drive.damping += max(-float(bias[2]), 0.0)
         # three motors of a ball joint act at right angles
-        both = math.hypot if model.jnt_type[joint] == _BALL else lambda a, b: a + b
-        drive.effort_limit = both(drive.effort_limit, own)
+        before, is_ball = drive.effort_limit, model.jnt_type[joint] == _BALL
+        drive.effort_limit = math.sqrt(before * before + own * own) if is_ball else before + own
     for joint, drive in drives.items():
         if model.jnt_actfrclimited[joint]:
             bound = float(np.abs(model.jnt_actfrcrange[joint]).max())

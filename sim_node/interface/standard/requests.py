@@ -4,7 +4,6 @@ A request is refused by a `RefusedRequestError`, whose code and sentence are the
 OK.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from importlib.util import find_spec
@@ -15,7 +14,7 @@ import numpy as np
 from msgs_config.bus.node import Answer, BusNode, Goal
 from msgs_config.errors import CommandError
 from msgs_config.frame_names import WORLD
-from msgs_config.geometry import rotations
+from msgs_config.geometry import fixed_order, rotations
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
 from msgs_config.shared_parameters import NO_GROUND, PLANE
 from sim_node.initial_state import POSITION, VELOCITY
@@ -326,7 +325,7 @@ def _place(request: Any, position: np.ndarray, velocity: np.ndarray) -> None:
     turn = rotations.exp(position[3:6])
     if getattr(request, "set_pose", True):
         turn = np.array([getattr(pose.orientation, name) for name in "xyzw"])
-        norm = math.sqrt(float(turn @ turn))
+        norm = float(fixed_order.norm(turn))
         if not 0.99 < norm < 1.01:
             raise RefusedRequestError(
                 INVALID_ENTITY_POSE, f"the quaternion's norm is {norm:g}; it must be 1"

@@ -160,6 +160,7 @@ def contract() -> set[str]:
     names = {"/sim_node/configuration", "/sim_node/keyframe"}
     for topic in topics.TABLE:
         alone = topic.name.partition("/")[0] in ("imu", "force", "contact_wrenches")
+        alone |= "ros2_control_bridge" in topic.way  # which is not there
         if not alone and not topic.name.startswith("/tf"):  # whose type is not among the wheels
             names.add("/" + topic.of(topics.CONTROLLER_NODE).name.lstrip("/"))
     return names
