@@ -20,7 +20,8 @@ def plan_senders(
 ) -> dict[str, dict[str, object]]:
     """The parameters of the node that sends what was planned, by its name; none if nothing was.
 
-    The controller waits for it; else the simulator, as where a foreign one may answer at once.
+    The controller waits for it; if `simulator_waits`, the simulator does: a foreign controller may
+    answer at once.
     """
     if not any(inputs.by_name().values()) and fork is None:
         return {}

@@ -149,9 +149,9 @@ class _Listener(ComposableNode):
         if self._collector.missing_ticks:
             raise RunError("a tick was not measured")
         figures, series = self._collector.results()
-        fell_at = figures["fell_at_s"]
-        after = None if fell_at is None else round(float(str(fell_at)) * clock.rate_hz)
-        is_down = series["is_down"]
+        fell, fell_at, is_down = figures["fell"], figures["fell_at_s"], series["is_down"]
+        assert fell is None or isinstance(fell, bool)
+        assert fell_at is None or isinstance(fell_at, float)
         keyframes = [
             Keyframe(tick, raw, self._controller[stamp_ns])
             for stamp_ns, raw in self._simulator.items()
@@ -160,12 +160,8 @@ class _Listener(ComposableNode):
             if first_tick < tick <= first_tick + len(is_down)
             and is_down[tick - first_tick - 1] != 1.0
         ]
-        fell = figures["fell"]
-        return Ended(
-            None if fell is None else bool(fell),
-            None if after is None else first_tick + after,
-            keyframes,
-        )
+        after = None if fell_at is None else round(fell_at * clock.rate_hz)
+        return Ended(fell, None if after is None else first_tick + after, keyframes)
 
 
 def _keep(keyframes: dict[int, bytes], raw: bytes) -> None:

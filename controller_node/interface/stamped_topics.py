@@ -9,7 +9,7 @@ from controller_node.behaviours.asked import asked_behaviour
 from controller_node.controller import Controller
 from controller_node.interface.publishers import ControllerPublishers
 from controller_node.interface.stamped_message import checked_start, decode_stamped
-from controller_node.interface.trajectory_goals import TrackedTick, TrajectoryGoals
+from controller_node.interface.trajectory_goals import TrajectoryGoals
 from controller_node.references.trajectory import points_of_lists
 from controller_node.strength import strengths_of
 from msgs_config.bus.node import BusNode
@@ -70,15 +70,7 @@ class StampedTopics:
 
     def judge(self, state: StampedState, reference: StampedReference) -> None:
         """Judge the goal of an action by a state that was answered, and its reference."""
-        self._goals.judge(
-            TrackedTick(
-                state.stamp_ns,
-                state.position,
-                state.velocity,
-                reference.position,
-                reference.velocity,
-            )
-        )
+        self._goals.judge(state, reference)
 
     def begin_episode(self) -> None:
         """End what does not outlive an episode."""

@@ -14,6 +14,7 @@ from msgs_config.bus.stamped_subscription import PastStampError
 from msgs_config.character.layout import JointLayout
 from msgs_config.errors import LayoutError, MotionError
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND
+from msgs_config.messages.state import StampedReference, StampedState
 
 PACKAGE = "control_msgs"
 _ACTION, _TYPE = "follow_joint_trajectory", f"{PACKAGE}/action/FollowJointTrajectory"
@@ -30,17 +31,6 @@ class ErrorCode(IntEnum):
     OLD_HEADER_TIMESTAMP = -3
     PATH_TOLERANCE_VIOLATED = -4
     GOAL_TOLERANCE_VIOLATED = -5
-
-
-@dataclass(frozen=True)
-class TrackedTick:
-    """State and reference of an answered state; units as on `joint_states`."""
-
-    stamp_ns: int
-    position: FloatArray  # (n,)
-    velocity: FloatArray  # (n,)
-    reference: FloatArray  # (n,)
-    reference_velocity: FloatArray  # (n,)
 
 
 @dataclass(frozen=True)
@@ -107,12 +97,12 @@ class TrajectoryGoal:
         self._patience_ns = _nanoseconds(request.goal_time_tolerance)
         self._feedback_at_ns = start_ns
 
-    def judge(self, tick: TrackedTick) -> None:
+    def judge(self, state: StampedState, reference: StampedReference) -> None:
         """Give the answer if it is over, else tell how far it is, 20 times a simulated second."""
-        if tick.stamp_ns < self._start_ns:
+        if state.stamp_ns < self._start_ns:
             return
-        error, velocity_error = self._errors(tick)
-        over_ns = tick.stamp_ns - int(self._times_ns[-1])
+        error, velocity_error = self._errors(state, reference)
+        over_ns = state.stamp_ns - int(self._times_ns[-1])
         if over_ns < 0:
             if violation := self._path.violation(self.names, error, velocity_error):
                 self.finish(ErrorCode.PATH_TOLERANCE_VIOLATED, violation)
@@ -123,15 +113,17 @@ class TrajectoryGoal:
         elif over_ns >= self._patience_ns:
             self.finish(ErrorCode.GOAL_TOLERANCE_VIOLATED, violation)
             return
-        if tick.stamp_ns >= self._feedback_at_ns:
-            self._feedback_at_ns = tick.stamp_ns + _FEEDBACK_PERIOD_NS
-            self._tell(tick, error, velocity_error)
+        if state.stamp_ns >= self._feedback_at_ns:
+            self._feedback_at_ns = state.stamp_ns + _FEEDBACK_PERIOD_NS
+            self._tell(state, reference, error, velocity_error)
 
-    def _errors(self, tick: TrackedTick) -> tuple[FloatArray, FloatArray]:
+    def _errors(
+        self, state: StampedState, reference: StampedReference
+    ) -> tuple[FloatArray, FloatArray]:
         """Reference against state (m,) of the named entries, and likewise of the velocities."""
-        state, wanted = map(self._layout.configuration, (tick.position, tick.reference))
-        away = self._layout.difference(state, wanted)
-        return away[self._entries], (tick.reference_velocity - tick.velocity)[self._entries]
+        is_at, wanted = map(self._layout.configuration, (state.position, reference.position))
+        away = self._layout.difference(is_at, wanted)
+        return away[self._entries], (reference.velocity - state.velocity)[self._entries]
 
     def finish(self, code: ErrorCode, sentence: str) -> None:
         """End it with a result."""
@@ -139,23 +131,29 @@ class TrajectoryGoal:
         self.goal.result.error_string = sentence
         self.answer.give(code == ErrorCode.SUCCESSFUL, sentence)
 
-    def _tell(self, tick: TrackedTick, error: FloatArray, velocity_error: FloatArray) -> None:
+    def _tell(
+        self,
+        state: StampedState,
+        reference: StampedReference,
+        error: FloatArray,
+        velocity_error: FloatArray,
+    ) -> None:
         message, entries = self.goal.feedback, self._entries
         stamp = message.header.stamp
-        stamp.sec, stamp.nanosec = divmod(tick.stamp_ns, NANOSECONDS_PER_SECOND)
+        stamp.sec, stamp.nanosec = divmod(state.stamp_ns, NANOSECONDS_PER_SECOND)
         message.joint_names = list(self.names)
         for point, positions, velocities in (
-            (message.desired, tick.reference[entries], tick.reference_velocity[entries]),
-            (message.actual, tick.position[entries], tick.velocity[entries]),
+            (message.desired, reference.position[entries], reference.velocity[entries]),
+            (message.actual, state.position[entries], state.velocity[entries]),
             (message.error, error, velocity_error),
         ):
             point.positions, point.velocities = positions.tolist(), velocities.tolist()
             since = point.time_from_start
             since.sec, since.nanosec = divmod(
-                tick.stamp_ns - self._start_ns, NANOSECONDS_PER_SECOND
+                state.stamp_ns - self._start_ns, NANOSECONDS_PER_SECOND
             )
         if hasattr(message, "index"):  # control_msgs of Jazzy's first releases lack it
-            message.index = int(np.searchsorted(self._times_ns, tick.stamp_ns))
+            message.index = int(np.searchsorted(self._times_ns, state.stamp_ns))
         self.goal.publish(message)
 
 
@@ -223,10 +221,10 @@ class TrajectoryGoals:
         goal.result.error_code, goal.result.error_string = int(code), sentence
         answer.give(False, sentence)
 
-    def judge(self, tick: TrackedTick) -> None:
+    def judge(self, state: StampedState, reference: StampedReference) -> None:
         """Judge the goal that is pursued, by an answered state."""
         if self._pursued is not None:
-            self._pursued.judge(tick)
+            self._pursued.judge(state, reference)
             if self._pursued.answer.is_given:
                 self._pursued = None
 
