@@ -7,7 +7,7 @@ Failure-Inducing Input".
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import TypeAlias, TypeVar
 
 Sizes: TypeAlias = Mapping[int, float]
@@ -73,7 +73,10 @@ def fewest(items: Sequence[_T], first: First[Sequence[_T]]) -> Sequence[_T]:
     if (found := first(few)) is not None:
         return few[found]
     left = ddmin(items, first)
-    pairs = list(combinations(items, 2))[:_MOST_PAIRS] if len(left) > 2 else []
+    if len(left) <= 2:
+        return left
+    gaps = range(1, len(items))  # those next to each other are the likeliest to act together
+    pairs = [pair for gap in gaps for pair in zip(items, items[gap:], strict=False)][:_MOST_PAIRS]
     found = first(pairs)
     return left if found is None else pairs[found]
 
@@ -113,18 +116,24 @@ def _failing_part(
 def smallest_size(first: First[float], size: float) -> float:
     """A size of which `SHARE` less does not fail, at most a given one, which does.
 
-    It halves what lies between the least that fails and what does not, to begin with nothing. Less
-    than a thousandth is not tried.
+    It asks about two sizes at once, which part in three what lies between the least that fails and
+    what does not, to begin with nothing. Less than a thousandth is not tried.
     """
     below = 0.0  # does not fail
     while size > _LEAST:
         smaller = (1.0 - SHARE) * size
-        half = float(f"{0.5 * (below + size):.{_DIGITS}g}")  # which is shorter to write
-        probe = smaller if below >= (1.0 - 2.0 * SHARE) * size else half
-        if first([probe]) is not None:
-            size = probe
-        elif probe == smaller:
+        one, two = (_rounded(below + share * (size - below)) for share in (1.0 / 3.0, 2.0 / 3.0))
+        probes = [smaller] if below >= (1.0 - 2.0 * SHARE) * size else [one, min(two, smaller)]
+        found = first(probes)
+        if found is not None:
+            below, size = (below, *probes)[found], probes[found]
+        elif probes[-1] == smaller:
             break
         else:
-            below = probe
+            below = probes[-1]
     return size
+
+
+def _rounded(size: float) -> float:
+    """A size that is shorter to write."""
+    return float(f"{size:.{_DIGITS}g}")

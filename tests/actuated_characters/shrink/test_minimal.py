@@ -85,6 +85,13 @@ def test_two_are_preferred_to_three_that_halves_would_find() -> None:
     assert sorted(fewest(range(8), first_of(fails))) == [3, 7]
 
 
+def test_two_next_to_each_other_are_tried_before_two_that_are_not() -> None:
+    fails = Asked(lambda some: {0, 1, 2} <= some or some == {5, 6})
+
+    assert sorted(fewest(range(8), first_of(fails))) == [5, 6]
+    assert frozenset((0, 3)) not in fails.asked
+
+
 def test_three_are_left_where_no_two_fail() -> None:
     fails = Asked(lambda some: {1, 4, 6} <= some)
 
@@ -100,7 +107,7 @@ def test_a_size_is_the_least_to_five_percent(least: float) -> None:
     assert (1.0 - SHARE) * size < least
 
 
-def test_what_cannot_be_smaller_was_tried_at_half_and_so_on() -> None:
+def test_what_cannot_be_smaller_was_tried_at_thirds_and_so_on() -> None:
     asked: list[float] = []
 
     def fails(size: float) -> bool:
@@ -108,7 +115,7 @@ def test_what_cannot_be_smaller_was_tried_at_half_and_so_on() -> None:
         return False
 
     assert smallest_size(first_of(fails), 1.0) == 1.0
-    assert asked == [0.5, 0.75, 0.875, 0.9375, 1.0 - SHARE]
+    assert asked == [0.3333, 0.6667, 0.7778, 0.8889, 0.9259, 1.0 - SHARE]
 
 
 def test_a_smaller_size_is_found_where_five_percent_less_does_not_fail() -> None:
