@@ -151,10 +151,14 @@ def _whole(found: Survey, directory: Path) -> Job:
 
 
 def _difference(tried: Done, whole: Done) -> str:
-    """The first thing that one of two runs says otherwise than the other; empty: nothing."""
+    """The first thing that one of two runs says otherwise than the other; empty: nothing.
+
+    Where the one ended with the fall, the other one may fail after it.
+    """
     first, second = tried.outcome, whole.outcome
     both = [(name, first.figures.get(name), second.figures.get(name)) for name in first.figures]
-    both = [*both, ("error", first.error or None, second.error or None)]
+    if first.figures.get(FELL) is not True:
+        both.append(("error", first.error or None, second.error or None))
     said = (
         f"{name} of row {whole.number} is {other}, of row {tried.number}, the same run, {one}"
         for name, one, other in both

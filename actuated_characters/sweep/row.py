@@ -121,7 +121,7 @@ def with_one_thread(arguments: Sequence[str]) -> list[str]:
 def run_row(
     task: RowTask, ask: Ask, directory: Path, run: Callable[[AskedRun, RowTask, Path], Outcome]
 ) -> Outcome:
-    """Run a row; its outcome, also if there is no such run, or it fails.
+    """Run a row; its outcome, also if there is no such run, or it fails on its way.
 
     Raises:
         RecordingError: the files cannot be written.
@@ -136,7 +136,16 @@ def run_row(
     except RecordingError:
         raise  # the disk is full, or the like: not what becomes of the row anywhere
     except ActuatedCharactersError as error:
-        return failed(error, directory)
+        return replace(_measured(directory), error=failed(error, directory).error)
+
+
+def _measured(directory: Path) -> Outcome:
+    """What a run has shown by now, which may have failed; without a verdict."""
+    try:
+        summary, _ = read_metrics(directory)
+    except RecordingError:
+        return Outcome({})
+    return Outcome(_figures(summary), state_hash=summary["state_hash"])
 
 
 def _run_whole(asked: AskedRun, task: RowTask, directory: Path) -> Outcome:

@@ -129,6 +129,23 @@ def test_what_is_another_run_when_it_is_made_whole_is_told(tmp_path: Path) -> No
     assert re.fullmatch(r"fell of row \d+ is False, of row \d+, the same run, True", line)
 
 
+def test_a_whole_run_may_diverge_once_it_has_fallen(tmp_path: Path) -> None:
+    class Diverging(Here):
+        def wait(self) -> Answer:
+            answer = super().wait()
+            if answer.task.until_fall:
+                return answer
+            return replace(answer, outcome=replace(answer.outcome, error="it diverged"))
+
+    found = started(tmp_path)
+    with Journal(tmp_path / "out", {}) as journal:
+        survey(found, tmp_path, Diverging(1), journal)
+        show_ends(found, tmp_path, Diverging(1), journal)
+        (line,) = found.differences(journal.done)
+
+    assert line.startswith("error of row ")  # that of the point at which all runs hold
+
+
 def test_runs_that_fail_by_a_figure_are_whole(tmp_path: Path) -> None:
     class Measuring(Here):
         def outcome(self, impulse: int, side: int) -> Outcome:

@@ -81,6 +81,20 @@ def test_a_row_that_fails_in_its_run_says_so_alike_wherever_it_is(tmp_path: Path
     assert (row_directory(tmp_path, 7) / "bag").is_dir()
 
 
+def test_a_row_that_fails_after_the_fall_has_figures_as_well(tmp_path: Path) -> None:
+    falling = ("--clip=walk", "--duration=3", "--set=controller_node.root_assistance:=false")
+    last = outcome_of(tmp_path, *falling)
+
+    outcome = outcome_of(tmp_path, *falling, "--push=chest:1e9,0,0@2.5")
+
+    assert last.error == ""
+    assert "diverged" in outcome.error
+    for name in ("fell", "fell_at_s"):
+        assert outcome.figures[name] == last.figures[name]
+    assert outcome.figures["fell"] is True
+    assert outcome.state_hash
+
+
 @pytest.mark.parametrize(("bags", "is_kept"), [("none", False), ("failures", False), ("all", True)])
 def test_the_bag_of_a_row_that_went_well_is_kept_if_all_are(
     tmp_path: Path, bags: str, is_kept: bool
