@@ -83,7 +83,8 @@ class Controller:
         # The limits of the gains that were in force last.
         self._limits = EffortLimits(self.layout, settings.gains.effort_limits)
         # Whether the answer to a state needs the contacts of the tick before.
-        self.needs_contacts = self._choice.needs_contacts
+        planned = self.planner is not None and self.planner.needs_contacts
+        self.needs_contacts = self._choice.needs_contacts or planned
         self.opponent = self._choice.opponent  # the character whose place it needs too; or none
         self._own_reference = reference
         # Whether commanded velocities steer the reference.
@@ -257,7 +258,7 @@ class Controller:
             velocity=acting.velocity,
             now=self._tracked.desired(seen.time, seen.now),
             upcoming=self._tracked.desired(seen.next_time, seen.upcoming),
-            offset=self._offset(acting, state, gains),
+            offset=self._offset(acting, state, gains, contacts),
             effort=output.effort,
         )
         effort = self._effort(tracking, gains)
@@ -329,7 +330,11 @@ class Controller:
         return self._limits.clipped(effort)
 
     def _offset(
-        self, acting: StampedState, seen: StampedState, gains: GainArrays
+        self,
+        acting: StampedState,
+        seen: StampedState,
+        gains: GainArrays,
+        contacts: FloatArray | None,
     ) -> FloatArray | None:
         """The offset of a planner to the tracking errors (n,); None without."""
         if self.planner is None:
@@ -337,5 +342,7 @@ class Controller:
         if not gains.stiffness[6:].any():
             self.planner.rest()
             return None
-        then, now = (TickState(self._tracked.tick(each.stamp_ns), each) for each in (acting, seen))
+        then, now = (
+            TickState(self._tracked.tick(each.stamp_ns), each, contacts) for each in (acting, seen)
+        )
         return self.planner.offset(then, now, gains, self._tracked.desired_at)

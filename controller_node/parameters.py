@@ -20,6 +20,7 @@ from controller_node.control_laws import LAWS, GainArrays
 from controller_node.controller import Controller
 from controller_node.controller_settings import ControllerSettings, LawSettings
 from controller_node.effort_series import read_effort_series
+from controller_node.ground import GroundSettings
 from controller_node.planner import factory
 from controller_node.planner import settings as planner_settings
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
@@ -75,6 +76,7 @@ PARAMETERS = [
     *LawSettings.declared(),
     *LAWS.parameters,
     *(replace(each, at_reset=True) for each in (*MOTION_PARAMETERS, *BEHAVIOUR_PARAMETERS)),
+    *GroundSettings.declared(),
     *PlannerParameters.declared(),
     *ControllerOptions.declared(),
 ]

@@ -1,16 +1,11 @@
 """Makes the simulation that the parameters of `sim_node` say."""
 
 from dataclasses import replace
-from pathlib import Path
 
-from msgs_config import files
-from msgs_config.character.model import Character, UrdfOptions
-from msgs_config.character.urdf.check import check_urdf
-from msgs_config.character.urdf.file_formats.source import read_urdf_text
-from msgs_config.errors import CharacterError
+from msgs_config.character.model import Character
 from msgs_config.parameters import Values
 from msgs_config.shared_parameters import NO_GROUND, PLANE
-from msgs_config.terrain.file import SUFFIXES, terrain_urdf
+from msgs_config.terrain.file import read_terrain
 from sim_node.initial_state import CharacterSettings
 from sim_node.parameters import SimulatorParameters
 from sim_node.physics.settings import SimulationSettings
@@ -55,17 +50,6 @@ def make_simulation_settings(values: Values) -> SimulationSettings:
         settings.world,
         step_s=settings.step_s,
         ground=on_plane,
-        terrain=None if on_plane or in_air else _read_terrain(settings.terrain),
+        terrain=None if on_plane or in_air else read_terrain(settings.terrain),
     )
     return replace(settings, world=world)
-
-
-def _read_terrain(path: str) -> UrdfOptions:
-    file = files.resolve(path, Path.cwd(), CharacterError)
-    text = (
-        terrain_urdf(file, files.read_text(file, CharacterError))
-        if file.suffix in SUFFIXES
-        else read_urdf_text(file).text
-    )
-    check_urdf(file, text)
-    return UrdfOptions(file, text, fixed_base=True)

@@ -13,9 +13,10 @@ from controller_node.behaviours.factory import (
 )
 from controller_node.behaviours.onnx_policy.factory import ONNX, policy_path
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
+from controller_node.ground import TERRAIN
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
-from controller_node.planner.settings import NO_PLANNER, RECORDED, PlannerParameters
+from controller_node.planner.settings import NO_PLANNER, PREDICTIVE, RECORDED, PlannerParameters
 from controller_node.references.base import Motion, Reference
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -32,6 +33,8 @@ from msgs_config.plain_values import as_plain, plain_parameters
 from msgs_config.shared_parameters import (
     KEYFRAME_BUDGET,
     KEYFRAME_PERIOD,
+    NO_GROUND,
+    PLANE,
     RESUME_FROM,
     collides,
     placed,
@@ -131,6 +134,7 @@ def make_plan(
     simulator_given["character"] = as_plain(character_name)
     controller_given = _with_reference(plain_parameters(reference), controller_given)
     controller_given["character"] = simulator_given["character"]
+    _show_terrain(simulator_given, controller_given)
     character = loaded or load_character(character_name, collides(simulator_given))
     character = placed(character, simulator_given)
     _keep_assistance_in_step(character, simulator_given, controller_given)
@@ -233,6 +237,13 @@ def with_shared(
                     "for controller_node; it must be the same"
                 )
     return {**both, **simulator}, {**both, **controller}
+
+
+def _show_terrain(simulator: Mapping[str, object], controller: dict[str, object]) -> None:
+    """A planner that looks ahead knows the terrain, unless it is told what to take for it."""
+    terrain = simulator.get(TERRAIN.name, PLANE)
+    if controller.get("planner") == PREDICTIVE and terrain not in (PLANE, NO_GROUND):
+        controller.setdefault(TERRAIN.name, terrain)
 
 
 def _keep_assistance_in_step(

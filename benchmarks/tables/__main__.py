@@ -2,7 +2,8 @@
 
 The tables of the pages: `clips`, `pushes` and `courses` are planned, by joint torques alone;
 `walk`, `jump` and `run` are of state machines; `captures` imports BVH files, and tracks them;
-`ground` has how deep clips sink into each engine's ground. A row is a kind of run; its yes or no
+`ground` has how deep clips sink into each engine's ground; `terrain` walks over stairs, slopes and
+unseen steps, planned. A row is a kind of run; its yes or no
 are counted, and of numbers there are the median and, in brackets, the least and the largest. Runs
 are in one process each, as over topics.
 """
@@ -23,7 +24,7 @@ from rich.console import Console  # noqa: E402 - after the limit on threads
 from rich.progress import Progress  # noqa: E402
 
 from benchmarks.support.printed import make_table  # noqa: E402
-from benchmarks.tables import captures, ground, machines, planned  # noqa: E402
+from benchmarks.tables import captures, ground, machines, planned, terrain  # noqa: E402
 from benchmarks.tables.case import heavier  # noqa: E402
 from benchmarks.tables.many import Options, Result, RunTable, cell, results, rows  # noqa: E402
 from benchmarks.tables.push_map import draw  # noqa: E402
@@ -35,6 +36,7 @@ TABLES: Mapping[str, RunTable] = {
     **machines.TABLES,
     **captures.TABLES,
     **ground.TABLES,
+    **terrain.TABLES,
 }
 
 

@@ -7,6 +7,7 @@ from controller_node.behaviours.onnx_policy import factory as onnx_policy  # noq
 from controller_node.behaviours.pursuit import PursuitSettings
 from controller_node.behaviours.settings import REACTIONS, ReactionSettings
 from controller_node.behaviours.state_machine import factory as state_machine
+from controller_node.ground import GroundSettings, on_ground
 from controller_node.planner.settings import NO_PLANNER, POLICY, RECORDED, PlannerParameters
 from controller_node.references import factory
 from controller_node.references.base import Motion
@@ -38,6 +39,7 @@ def make_motion(character: Character, values: Values) -> Motion:
         ActuatedCharactersError: a file or a name does not exist, or does not fit the character.
     """
     motion = factory.make_motion(character, values)
+    motion = on_ground(motion, character, GroundSettings.of(values).terrain)
     if BehaviourSettings.of(values).behaviour != state_machine.STATE_MACHINE:
         return motion
     return state_machine.limited(motion, values)

@@ -4,7 +4,7 @@ A push that moves the character by a step cannot be undone at once by its feet. 
 perturbed the reference's world is moved and turned after the character, and slowly back all the
 while: a point p of it is at `R p + t` in the world, with R the turn about z by `yaw`. A reference
 that stands has no steps for a way back: its world follows the character as it comes to stand, too,
-and stays there until the reference goes on.
+and stays there until the reference goes on. On uneven ground it is as high as the feet that stand.
 """
 
 import math
@@ -13,8 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller_node.planner.compiled.anchoring import advance_anchor
+from controller_node.planner.felt_ground import FeltGround
 from msgs_config.arrays import FloatArray
 from msgs_config.geometry import rotations
+
+_NOTHING_FELT = FeltGround()
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,18 @@ class PlanarState:
 
 @dataclass(frozen=True)
 class Anchor:
-    """Where the reference's world is in the world; moved about the ground and turned about z."""
+    """Where the reference's world is in the world: moved about, turned about z, and lifted."""
 
     place: complex = 0j  # t, m, x + i y
     yaw: float = 0.0  # rad
     calm_from: float = 0.0  # s since the episode began; until then the character is perturbed
     settled_from: float = 0.0  # s in the episode; until then the reference has not stood for long
+    ground: FeltGround = _NOTHING_FELT
+
+    @property
+    def lift(self) -> float:
+        """How high its ground is in the world, m."""
+        return self.ground.level
 
     def is_perturbed(self, time: float) -> bool:
         """Whether the character is at a time in s: the feet go where they catch it."""
@@ -44,11 +53,12 @@ class Anchor:
         self, position: FloatArray, velocity: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """A state of the world in the reference's: MuJoCo's position (q,), velocity (n,)."""
-        if self.place == 0 and self.yaw == 0.0:
+        if self.place == 0 and self.yaw == 0.0 and self.lift == 0.0:
             return position, velocity  # unchanged to the last bit
         position, velocity = position.copy(), velocity.copy()
         back = _turn(-self.yaw)
         position[:2] = _pair(back * (complex(*position[:2]) - self.place))
+        position[2] -= self.lift
         velocity[:2] = _pair(back * complex(*velocity[:2]))
         root = rotations.xyzw_from_wxyz(position[3:7])
         turned = rotations.multiply(rotations.about_z(-self.yaw), root)
@@ -57,7 +67,7 @@ class Anchor:
 
     def to_world(self, points: FloatArray) -> FloatArray:
         """Points (m, 3) of the reference's world in the world, m."""
-        shift = np.array((self.place.real, self.place.imag, 0.0))
+        shift = np.array((self.place.real, self.place.imag, self.lift))
         placed: FloatArray = rotations.rotate(rotations.about_z(self.yaw), points) + shift
         return placed
 
@@ -93,7 +103,8 @@ class Anchor:
                 wanted.turn,
                 time,
                 elapsed,
-            )
+            ),
+            self.ground,
         )
 
 

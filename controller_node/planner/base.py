@@ -23,6 +23,8 @@ class TickState:
 
     tick: int
     state: StampedState
+    contacts: FloatArray | None = None
+    """The net wrenches (links, 6) of the tick before, N and N m, world axes, where they count."""
 
 
 class Planner(Protocol):
@@ -31,6 +33,10 @@ class Planner(Protocol):
     @property
     def in_flight(self) -> "CommandsInFlight | None":
         """The commands that have not acted yet; None where they act at once."""
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether states are to come with contacts."""
 
     @property
     def parts(self) -> tuple[object, ...]:

@@ -6,19 +6,21 @@ softer than any world's, so what is foreseen is not quite what will be; or they 
 MuJoCo's world.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import mujoco
 import numpy as np
 
 from controller_node.control_laws import GainArrays
+from controller_node.ground import FELT, ground_shapes
 from controller_node.planner.compiled.features import FeatureLayout, Watched
 from controller_node.planner.compiled.law import Joints
 from controller_node.planner.compiled.rollout import EngineBuffers, RolloutModel
 from controller_node.planner.settings import OWN_CONTACTS, PlannerParameters
 from msgs_config.arrays import FloatArray
-from msgs_config.character.model import Character, Link
+from msgs_config.character.extents import farthest
+from msgs_config.character.model import Character, Link, Shape
 from msgs_config.character.mujoco_model import (
     add_links,
     ancestors,
@@ -27,6 +29,7 @@ from msgs_config.character.mujoco_model import (
     quaternion_starts,
 )
 from msgs_config.character.mujoco_world import Contacts, add_character, add_ground, set_options
+from msgs_config.character.terrain import is_plane
 from msgs_config.compiled.data_layout import data_fields, raw_data
 from msgs_config.compiled.law import LawGains
 from msgs_config.compiled.mass_matrix import MassMatrix, Tree
@@ -40,8 +43,14 @@ _LIMIT = (0.01, 1.0)  # time constant in s and damping ratio of the limits of hi
 
 _UNUSED_PARTS = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # MuJoCo's parts
 
+_STANDS = 20.0  # N upwards on a foot that stands, at least
+
 _GROUND = "ground"
+_DOWN = np.array((0.0, 0.0, -1.0))
+_PLANE = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": (0.0, 0.0, 1.0)}
 _BY_PAIRS = {"contype": 0, "conaffinity": 0}  # explicit pairs say which shapes may touch
+_TERRAIN, _ON_TERRAIN = {"contype": 1, "conaffinity": 0}, {"contype": 0, "conaffinity": 1}
+_TERRAIN_PRIORITY = 1  # MuJoCo takes friction and stiffness of the shape with the higher one
 
 
 class ContactModel:
@@ -58,13 +67,24 @@ class ContactModel:
         gravity: float,
         friction: float,
         contact: str = OWN_CONTACTS,
+        terrain: Sequence[Shape] = (),
+        plane_each: bool = False,
     ) -> None:
-        """Build the model; `friction` is that of a contact, the product of both surfaces'."""
+        """Build the model; `friction` is that of a contact, the product of both surfaces'.
+
+        Without the shapes of a terrain the ground is the plane z = 0, which `put_planes` puts
+        elsewhere for each foot if there is a plane for each.
+        """
         self._character = character
         self._period_s = period_s
         self._has_own_contacts = contact == OWN_CONTACTS
+        has_planes = plane_each and self._has_own_contacts
+        own_planes = [character.links[each].name for each in _feet(character) if has_planes]
         compile_model = _compile if self._has_own_contacts else _compile_world
-        self._model = compile_model(character, period_s, gravity, friction)
+        self._model = compile_model(character, period_s, gravity, friction, terrain, own_planes)
+        self._planes = [self._model.geom(_plane_of(foot)).id for foot in own_planes]
+        self.put_planes(np.zeros(len(own_planes)))
+        self._looked_at = mujoco.MjData(self._model)
         self._data: list[mujoco.MjData] = []
         self._identity = np.zeros(self._model.nq)
         self._identity[quaternion_starts(self._model)] = 1.0
@@ -90,7 +110,34 @@ class ContactModel:
             gravity=given.gravity,
             friction=given.friction,
             contact=given.contact,
+            terrain=ground_shapes(given.terrain),
+            plane_each=given.terrain == FELT,
         )
+
+    def put_planes(self, heights: FloatArray) -> None:
+        """Put the plane of each foot, if it has one, at a height (f,) in m.
+
+        Nothing may be rolled out meanwhile.
+        """
+        if self._planes:
+            self._model.geom_pos[self._planes, 2] = heights
+
+    def soles(self, position: FloatArray, contacts: FloatArray) -> FloatArray:
+        """Heights (f,) of the soles that stand in a position (q,), m; NaN of others.
+
+        `contacts` are the net wrenches (links, 6) that act on the links, N and N m, world axes.
+        """
+        data = self._looked_at
+        data.qpos[:] = position
+        mujoco.mj_kinematics(self._model, data)
+        heights = []
+        for index in _feet(self._character):
+            turn = rotations.xyzw_from_wxyz(data.xquat[index + 1])
+            shapes = self._character.links[index].collision_shapes
+            below = max((farthest(each, turn, _DOWN) for each in shapes), default=0.0)
+            stands = contacts[index, 2] > _STANDS
+            heights.append(data.xpos[index + 1, 2] - below if stands else np.nan)
+        return np.array(heights)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -194,7 +241,12 @@ def _left_axis(character: Character) -> FloatArray:
 
 
 def _compile(
-    character: Character, period_s: float, gravity: float, friction: float
+    character: Character,
+    period_s: float,
+    gravity: float,
+    friction: float,
+    terrain: Sequence[Shape],
+    own_planes: Sequence[str],
 ) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # limits are in rad
@@ -208,8 +260,15 @@ def _compile(
     option.disableflags = sum(
         int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{part}")) for part in _UNUSED_PARTS
     )
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(type=plane, size=(0.0, 0.0, 1.0), name=_GROUND, **_BY_PAIRS)
+    contact = {"condim": 3, "solref": _CONTACT}
+    for shape in terrain:
+        each = {**_plane_or(shape, spec), **contact, "friction": (friction, 0.0, 0.0)}
+        spec.worldbody.add_geom(**each, priority=_TERRAIN_PRIORITY, **_TERRAIN)
+    if not terrain:
+        spec.worldbody.add_geom(**_PLANE, name=_GROUND, **_BY_PAIRS)
+        for foot in own_planes:  # not in the world's own frame: MuJoCo would keep it there
+            place = (0.0, 0.0, -1.0)
+            spec.worldbody.add_geom(**_PLANE, pos=place, name=_plane_of(foot), **_BY_PAIRS)
     for link, body in zip(character.links, add_links(spec, character.links), strict=True):
         if np.isfinite(link.joint.lower):
             (joint,) = body.joints
@@ -217,23 +276,38 @@ def _compile(
             joint.range = (link.joint.lower, link.joint.upper)
             joint.solref_limit = _LIMIT
         for name, shape in zip(_names(link), link.collision_shapes, strict=True):
-            body.add_geom(name=name, **geometry(spec, shape), **_BY_PAIRS)
-    for one, other in _touching(character):
-        pair = spec.add_pair(geomname1=one, geomname2=other)
-        pair.condim, pair.solref = 3, _CONTACT
+            touched = _ON_TERRAIN if terrain else _BY_PAIRS
+            body.add_geom(name=name, **geometry(spec, shape), **touched)
+    for one, other in _touching(character, () if terrain else (_GROUND,), own_planes):
+        pair = spec.add_pair(geomname1=one, geomname2=other, **contact)
         pair.friction = (friction, friction, 0.0, 0.0, 0.0)
     return compile_for_contacts(spec, character.links)
 
 
+def _plane_or(shape: Shape, spec: mujoco.MjSpec) -> dict[str, object]:
+    """A terrain's shape as MuJoCo has it; what stands for a plane as a plane."""
+    if not is_plane(shape):
+        return geometry(spec, shape)
+    turn = np.array(shape.pose.orientation_xyzw)
+    top = np.array((0.0, 0.0, 0.5 * shape.size[2]))
+    place = np.array(shape.pose.position) + rotations.rotate(turn, top)
+    return {**_PLANE, "pos": place, "quat": rotations.wxyz_from_xyzw(turn)}
+
+
 def _compile_world(
-    character: Character, period_s: float, gravity: float, friction: float
+    character: Character,
+    period_s: float,
+    gravity: float,
+    friction: float,
+    terrain: Sequence[Shape],
+    own_planes: Sequence[str],
 ) -> mujoco.MjModel:
     """As engine MuJoCo has it with its defaults, where a step is a tick."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # limits are in rad
     contacts = Contacts(period_s, friction, LINK_FRICTION * LINK_FRICTION)
     set_options(spec.option, contacts, gravity)
-    add_ground(spec, contacts)
+    add_ground(spec, contacts, plane=not terrain, shapes=terrain)
     add_character(spec, "", character, contacts)
     return compile_for_contacts(spec, character.links)
 
@@ -243,11 +317,24 @@ def _names(link: Link) -> list[str]:
     return [f"{link.name} {number}" for number in range(len(link.collision_shapes))]
 
 
-def _touching(character: Character) -> Iterator[tuple[str, str]]:
+def _feet(character: Character) -> list[int]:
+    """The links of the feet, in the order of the end effectors."""
+    links = character.links
+    return [index for index in character.end_effectors if links[index].name in character.feet]
+
+
+def _plane_of(foot: str) -> str:
+    return f"{_GROUND} below {foot}"
+
+
+def _touching(
+    character: Character, ground: Sequence[str], own_planes: Sequence[str]
+) -> Iterator[tuple[str, str]]:
     """Pairs of shapes that may touch: with the ground, and with those of links not above them."""
     links = character.links
     for index, link in enumerate(links):
-        yield from product(_names(link), [_GROUND])
+        below = (_plane_of(link.name),) if link.name in own_planes else ground
+        yield from product(_names(link), below)
         if character.loading.self_collision:
             above = ancestors(character, index)
             for other in (other for other in range(index) if other not in above):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from controller_node.control_laws import GainArrays
+from controller_node.ground import FELT, TERRAIN
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.base import DesiredAt, TickState
 from controller_node.planner.commands_in_flight import CommandsInFlight
@@ -34,8 +35,10 @@ from controller_node.planner.settings import PlannerSettings
 from controller_node.references.base import ReferenceState
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import fixed_order
 from msgs_config.messages.state import StampedState
+from msgs_config.shared_parameters import PLANE
 
 _PATIENCE = 0.005  # s between two looks at what else there is to do
 
@@ -97,6 +100,8 @@ class PredictivePlanner:
         self._thread = ThreadPoolExecutor(1)
         self._act: Callable[[], object] = int  # called while it waits; `int` does nothing
         self._rate_hz = given.rate_hz
+        self.needs_contacts = given.terrain == FELT
+        self._gives_way = given.gives_way and given.terrain in (PLANE, FELT)
         self._seed = given.seed
         self._episode = 0
         self._plan: Plan | None = None
@@ -179,16 +184,16 @@ class PredictivePlanner:
             desired_at: The reference.
         """
         del seen
-        tick, state = acting.tick, acting.state
+        tick = acting.tick
         self._forget_what_is_over(tick)
         self._take(tick)
         if self._plan is None:
-            self._coming = self._start_search(tick, tick, state, gains, desired_at)
+            self._coming = self._start_search(acting, tick, gains, desired_at)
             self._take(tick)
         assert self._plan is not None
         acts = tick + self.settings.parameters.planning_delay
         if self._coming is None and acts >= self._plan.tick + self.settings.period:
-            self._coming = self._start_search(tick, acts, state, gains, desired_at)
+            self._coming = self._start_search(acting, acts, gains, desired_at)
             self._take(tick)
         return np.concatenate((np.zeros(6), self._plan.offsets.at(tick)))
 
@@ -276,14 +281,14 @@ class PredictivePlanner:
         self._plan = plan
 
     def _start_search(
-        self, tick: int, acts: int, state: StampedState, gains: GainArrays, desired_at: DesiredAt
+        self, seen: TickState, acts: int, gains: GainArrays, desired_at: DesiredAt
     ) -> PendingPlan:
         """A plan that acts from a later tick on, from the state to which this one will lead."""
-        body = self._model.body(gains)
+        tick, body = seen.tick, self._model.body(gains)
         target = self._reference.target(tick, desired_at, body)
         later = round(SOON * self._rate_hz)
         soon = self._reference.target(tick + later, desired_at, body)
-        position, velocity = self._observe(tick, state, body, target, soon)
+        position, velocity = self._observe(seen, body, target, soon)
         if self._plan is not None and acts > tick:
             offsets = self._plan.offsets
             between = self._reference.between(tick, acts, offsets.first_knot, desired_at, body)
@@ -301,30 +306,39 @@ class PredictivePlanner:
 
     def _observe(
         self,
-        tick: int,
-        state: StampedState,
+        at: TickState,
         body: RolloutModel,
         target: ReferenceSample,
         soon: ReferenceSample,
     ) -> tuple[FloatArray, FloatArray]:
         """A state in the reference's world, (q,) and (n,), which may have given way to it."""
-        position = self._model.position_of(state.position)
+        tick, position = at.tick, self._model.position_of(at.state.position)
         # A message's array cannot be written to, which is another type to compiled code.
-        velocity = state.velocity.copy()
-        if not self.settings.parameters.gives_way:
-            return position, velocity
+        velocity, centre = at.state.velocity.copy(), self._residual_model.centre
+        elapsed = 0.0 if self._plan is None else (tick - self._plan.seen) / self._rate_hz
+        if self.needs_contacts:
+            self._feel(position, at.contacts)
         seen = self.anchor.to_reference_world(position, velocity)
+        if not self._gives_way:
+            return seen
         look = ReferenceSample(*seen, self._rollouts.features_of(*seen, body))
-        since_plan = tick - (tick if self._plan is None else self._plan.seen)
-        centre = self._residual_model.centre
         self.anchor = self.anchor.advanced(
             look.planar(centre),
             target.planar(centre),
             soon.planar(centre),
             tick / self._rate_hz,
-            since_plan / self._rate_hz,
+            elapsed,
         )
         return self.anchor.to_reference_world(position, velocity)
+
+    def _feel(self, position: FloatArray, contacts: FloatArray | None) -> None:
+        """Have the ground of both models where the feet stand in a position (q,)."""
+        if contacts is None:
+            raise ConfigurationError(f"'{TERRAIN.name}' {FELT} needs each state's contacts")
+        ground = self.anchor.ground.after(self._model.soles(position, contacts))
+        self.anchor = replace(self.anchor, ground=ground)
+        for model in (self._model, self._stepped):
+            model.put_planes(ground.planes)
 
 
 def _copy_of(made_of: tuple[Character, PlannerSettings], state: Any) -> object:

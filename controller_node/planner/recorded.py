@@ -19,6 +19,7 @@ class RecordedPlanner:
     """Plays a recorded plan where a planner would plan; it looks at no state."""
 
     outlook: Outlook | None = None
+    needs_contacts = False
 
     def __init__(self, plan: RecordedPlan, in_flight: "CommandsInFlight | None" = None) -> None:
         self._plan = plan

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller_node.ground import FELT, TERRAIN
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter, shared
-from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, PLANE, RATE
+from msgs_config.shared_parameters import COMMAND_DELAY, GRAVITY, NO_GROUND, PLANE, RATE
 
 NO_PLANNER = "none"
 PREDICTIVE = "predictive"
@@ -56,6 +57,7 @@ class PlannerParameters(Settings, prefix="plan."):
     rate_hz: int = shared(RATE)
     gravity: float = shared(GRAVITY)
     delay: int = shared(COMMAND_DELAY)  # ticks
+    terrain: str = shared(TERRAIN)
     planner: str = parameter(
         NO_PLANNER,
         "what keeps a floating base's motion by joint torques alone: nothing, planning ahead in a "
@@ -97,7 +99,8 @@ class PlannerParameters(Settings, prefix="plan."):
     gives_way: bool = parameter(
         True,
         "the reference's place and heading follow a character that is pushed out of reach or "
-        "stops beside them, and return; without, it is always held to its own place",
+        "stops beside them, and return; without, and on other ground than the plane, it is always "
+        "held to its own place",
     )
     seed: int = parameter(0, "of the samples", maximum=2**53)
     friction: float = parameter(0.38, "of contacts as foreseen; a margin against slips", maximum=10)
@@ -200,17 +203,27 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
     own = PlannerParameters.of(values)
     if own.planner == NO_PLANNER:
         return
-    terrain = simulator.get("terrain", PLANE)
-    if terrain != PLANE:
-        raise ConfigurationError(
-            f"planner '{own.planner}' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
-            f"{terrain}; it must be {PLANE}"
-        )
+    _check_terrain(own, simulator.get(TERRAIN.name, own.terrain))
     delay = simulator.get(COMMAND_DELAY.name, own.delay)
     if delay != own.delay:
         raise ConfigurationError(
             f"planner '{own.planner}' counts with '{COMMAND_DELAY.name}' {own.delay}, but "
             f"sim_node's is {delay}; it must be the same"
+        )
+
+
+def _check_terrain(own: PlannerParameters, terrain: object) -> None:
+    """Raise ConfigurationError if a planner does not know a simulator's terrain."""
+    knows_more = own.planner == PREDICTIVE and terrain != NO_GROUND
+    if terrain != PLANE and not knows_more:
+        raise ConfigurationError(
+            f"planner '{own.planner}' knows the ground at z = 0 alone, but sim_node's 'terrain' is "
+            f"{terrain}; it must be {PLANE}"
+        )
+    if own.terrain != FELT and (own.terrain == PLANE) != (terrain == PLANE):
+        raise ConfigurationError(
+            f"controller_node's '{TERRAIN.name}' is {own.terrain}, but sim_node's is {terrain}; it "
+            f"must be the same, or {FELT} for a planner that is to be blind to it"
         )
 
 

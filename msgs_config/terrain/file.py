@@ -1,10 +1,13 @@
-"""A terrain's YAML file, as the URDF that both engines load and recordings keep."""
+"""A terrain's file: its YAML as the URDF that both engines load and recordings keep."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgs_config import files
+from msgs_config.character.model import UrdfOptions
+from msgs_config.character.urdf.check import check_urdf
+from msgs_config.character.urdf.file_formats.source import read_urdf_text
 from msgs_config.errors import CharacterError
 from msgs_config.mappings import MappingReader
 from msgs_config.terrain.pieces import Block, placed, random_heights, slope, squares, stairs
@@ -20,6 +23,22 @@ _MOST_BLOCKS = 20_000
 _PLANE = (
     '<link name="plane"><collision><geometry><plane normal="0 0 1"/></geometry></collision></link>'
 )
+
+
+def read_terrain(path: str) -> UrdfOptions:
+    """The terrain that a parameter `terrain` names.
+
+    Raises:
+        CharacterError: its file cannot be used.
+    """
+    file = files.resolve(path, Path.cwd(), CharacterError)
+    text = (
+        terrain_urdf(file, files.read_text(file, CharacterError))
+        if file.suffix in SUFFIXES
+        else read_urdf_text(file).text
+    )
+    check_urdf(file, text)
+    return UrdfOptions(file, text, fixed_base=True)
 
 
 def terrain_urdf(path: Path, text: str) -> str:

@@ -32,6 +32,8 @@ _CALM_S = 0.4  # s for which it must have been so
 class HybridPlanner:
     """Goes over from a policy to plans, and back. It remembers which of them leads."""
 
+    needs_contacts = False
+
     def __init__(self, character: Character, policies: Policies, settings: PlannerSettings) -> None:
         """Build both models of the dynamics."""
         self._rate_hz = settings.parameters.rate_hz

@@ -50,6 +50,8 @@ class Told(ReferenceSample):
 class PolicyPlanner:
     """Answers each decision in constant time. It remembers the last one, and the anchor."""
 
+    needs_contacts = False
+
     def __init__(
         self,
         character: Character,

@@ -17,17 +17,24 @@ class Footprint:
 
     place: complex  # m, x + 1j y
     heading: float  # rad, against how the foot faces at rest
+    height: float = 0.0  # m, of the ground
+    slope: complex = 0j  # m that the ground rises a m, along x + 1j along y
 
     def moved_by(self, other: "Footprint") -> "Footprint":
         """It, where it was said in the frame of another one."""
-        place = other.place + self.place * cmath.rect(1.0, other.heading)
-        return Footprint(place, self.heading + other.heading)
+        turn = cmath.rect(1.0, other.heading)
+        place = other.place + self.place * turn
+        return Footprint(place, self.heading + other.heading, self.height, self.slope * turn)
 
     def towards(self, other: "Footprint", share: float) -> "Footprint":
         """Between it and another one, by the shorter turn."""
         turn = math.remainder(other.heading - self.heading, math.tau)
-        place = self.place + share * (other.place - self.place)
-        return Footprint(place, self.heading + share * turn)
+        return Footprint(
+            self.place + share * (other.place - self.place),
+            self.heading + share * turn,
+            self.height + share * (other.height - self.height),
+            self.slope + share * (other.slope - self.slope),
+        )
 
 
 @dataclass(frozen=True)

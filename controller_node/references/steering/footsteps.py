@@ -18,6 +18,7 @@ from msgs_config.geometry import rotations
 
 _STANDING = 0.35  # share of the mean speed over the ground, below which a foot stands
 _STRAY = 0.1  # share of a cycle in which a foot may do otherwise than once a cycle
+_LIFT, _MOST_LIFT = 0.25, 0.04  # of a rise, and m: how far a foot is lifted over an edge
 _NEAR, _FACING = 0.01, 0.05  # m and rad from where it stands at ease, at which a foot is there
 
 
@@ -132,6 +133,29 @@ def swing_share(was: float, now: float) -> float:
     """
     left = 1.0 - eased(was)
     return 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
+
+
+def clearance(swung: float, left: float) -> float:
+    """How much higher than on a straight line a foot swings from one height to another, m.
+
+    It rises early and sinks late, and over either edge it is lifted as well.
+
+    Args:
+        swung: How much of its swing is done, from 0 to 1.
+        left: m that it still has to rise on the straight line.
+    """
+    share = eased(swung)
+    if share == 1.0:
+        return 0.0
+    rise = left / (1.0 - share)
+    sooner = 1.0 - (1.0 - share) ** 3 if rise > 0.0 else share**3
+    return rise * (sooner - share) + min(_LIFT * abs(rise), _MOST_LIFT) * hump(swung)
+
+
+def hump(swung: float) -> float:
+    """From 0 at both ends of a swing to 1 amid it."""
+    share = eased(swung)
+    return 4.0 * share * (1.0 - share)
 
 
 def is_at_ease(foot: Footprint, ease: Footprint, course: Course) -> bool:

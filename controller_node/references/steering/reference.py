@@ -9,6 +9,7 @@ import numpy as np
 
 from controller_node.references.base import ReferenceState
 from controller_node.references.steering.course import Course
+from controller_node.references.steering.footholds import Footholds, Ground
 from controller_node.references.steering.gait import Gait
 from controller_node.references.steering.legs import Legs
 from controller_node.references.steering.stepping import Stepping
@@ -57,10 +58,18 @@ class SteeredReference:
         rate_hz: int,
         start: tuple[int, Course] | None = None,
         commands: Sequence[VelocityCommand] = (),
+        footholds: Footholds | None = None,
+        steps_high: bool = False,
     ) -> None:
-        """Begin at a tick on a course, else standing; commands are in the order of their ticks."""
+        """Begin at a tick on a course, else standing; commands are in the order of their ticks.
+
+        Without footholds the ground is the plane z = 0. Who steps high gets over edges that it does
+        not know of.
+        """
         self._character, self._gait = character, gait
-        self._legs, self._stepping = Legs(character), Stepping(gait)
+        self._legs = Legs(character)
+        self._stepping = Stepping(gait, footholds, is_high=steps_high)
+        self._footholds, self._steps_high = footholds, steps_high
         self.limits = limits
         self._rate = rate_hz
         self._start = (0, self._stepping.standing()) if start is None else start
@@ -110,6 +119,8 @@ class SteeredReference:
             rate_hz=self._rate,
             start=(now, self.course(now)),
             commands=[*before, command],
+            footholds=self._footholds,
+            steps_high=self._steps_high,
         )
         since = self._end_of_likeness(command)
         if now >= self._first:
@@ -118,8 +129,27 @@ class SteeredReference:
 
     def within(self, region: VelocityRegion) -> "SteeredReference":
         """One that has no command yet, and takes them within a region."""
-        limits = self.limits.narrowed(region)
-        return SteeredReference(self._character, self._gait, limits, rate_hz=self._rate)
+        return self._anew(self.limits.narrowed(region), self._footholds, self._steps_high)
+
+    def over(self, ground: Ground | None) -> "SteeredReference":
+        """One that has no command yet, and whose feet find their places on a ground.
+
+        Where that is None, it is a plane but for edges that nobody knows of: it steps high.
+        """
+        footholds = None if ground is None else Footholds(self._character, ground)
+        return self._anew(self.limits, footholds, steps_high=ground is None)
+
+    def _anew(
+        self, limits: SteeringLimits, footholds: Footholds | None, steps_high: bool
+    ) -> "SteeredReference":
+        return SteeredReference(
+            self._character,
+            self._gait,
+            limits,
+            rate_hz=self._rate,
+            footholds=footholds,
+            steps_high=steps_high,
+        )
 
     def _take_over(self, other: "SteeredReference", first: int, last: int) -> None:
         """Remember what another one does, which is the same from one tick to another one."""
@@ -200,6 +230,7 @@ class SteeredReference:
         position[:3] = (position[0] + course.x, position[1] + course.y, upright * position[2])
         turns[0] = rotations.multiply(rotations.multiply(about_z, lean), turns[0])
         placed = GeneralizedPosition(position, turns)
+        position[2] += self._stepping.height(course)
         if course.feet:
             self._legs.reach(placed, self._stepping.on_prints(feet, course))
         position[self._character.layout.rotation_entries] = rotations.log(turns)

@@ -1,12 +1,16 @@
 """When a steered character steps, how fast, and where its feet are by that."""
 
 import cmath
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from controller_node.references.steering import footsteps
 from controller_node.references.steering.course import Course, Footprint
+from controller_node.references.steering.footholds import Footholds
+from controller_node.references.steering.footsteps import FootCycle
 from controller_node.references.steering.gait import Gait
 from controller_node.references.steering.velocity import (
     STOP,
@@ -14,6 +18,7 @@ from controller_node.references.steering.velocity import (
     VelocityCommand,
     within,
 )
+from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
 from msgs_config.geometry import rotations
 
@@ -21,6 +26,8 @@ _LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are li
 _EASE = 0.5  # of it: slower steps are as narrow as those
 _AIM_TIME_CONSTANT = 0.1  # s, of a foot's aim that another command changes as it swings
 _PACE_TIME = 0.4  # s in which the pace changes by the slowest captured speed, at least
+_HIGH, _TOES_UP = 0.1, 0.4  # m and rad: how much higher a foot swings over ground that it feels
+_SINKS = 0.2  # m that the root sinks for each m from a foot to the other
 
 
 class Stepping:
@@ -31,8 +38,11 @@ class Stepping:
     runs backward, from when no foot swings on. Else the gait's feet slide.
     """
 
-    def __init__(self, gait: Gait) -> None:
-        self._gait = gait
+    def __init__(
+        self, gait: Gait, footholds: Footholds | None = None, *, is_high: bool = False
+    ) -> None:
+        """Step on the plane, or on what footholds there are; high if it may not be a plane."""
+        self._gait, self._footholds, self._is_high = gait, footholds, is_high
         self._height = float(gait.at(0.0, 0.0)[0].position[2])  # m, of the root
 
     def standing(self) -> Course:
@@ -71,6 +81,8 @@ class Stepping:
                 continue  # it stands
             time = (cycle.to_middle(phase, backward) if now else 0.5 * cycle.duty) / rate
             target = self._where_it_stands(row, there, wanted, limits, time)
+            if self._footholds is not None:
+                target = self._footholds.nearest(row, target)
             if was:
                 target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
             targets[row] = target
@@ -114,7 +126,36 @@ class Stepping:
             x, y = places[3 * row : 3 * row + 2].tolist()
             place = foot.place + (complex(x, y) - each.place) * cmath.rect(1.0, angle)
             places[3 * row : 3 * row + 2] = place.real, place.imag
-        return GeneralizedPosition(places, rotations.multiply(about_z, feet.orientations_xyzw))
+        placed = GeneralizedPosition(places, rotations.multiply(about_z, feet.orientations_xyzw))
+        if self._is_high:
+            _lift(placed, course, cycles)
+        if self._footholds is not None:
+            self._put_on_ground(placed, course, cycles)
+        return placed
+
+    def _put_on_ground(
+        self, feet: GeneralizedPosition, course: Course, cycles: Sequence[FootCycle]
+    ) -> None:
+        """Lift and tilt feet, which are on the plane z = 0, as the ground is at their prints."""
+        pairs = zip(course.feet, course.targets, cycles, strict=True)
+        for row, (foot, target, cycle) in enumerate(pairs):
+            tilt = _tilt(foot.slope)
+            swung = cycle.swung(course.phase, course.is_backward)
+            left = target.height - foot.height
+            above: FloatArray = np.array((0.0, 0.0, feet.position[3 * row + 2]))
+            above = rotations.rotate(tilt, above)
+            above[2] += foot.height + (footsteps.clearance(swung, left) if swung else 0.0)
+            feet.position[3 * row : 3 * row + 2] += above[:2]
+            feet.position[3 * row + 2] = above[2]
+            feet.orientations_xyzw[row] = rotations.multiply(tilt, feet.orientations_xyzw[row])
+
+    def height(self, course: Course) -> float:
+        """How high the ground is for the root, m: as its feet's, a bit lower between two heights.
+
+        A leg whose foot stays a step below does not reach it else.
+        """
+        heights = [foot.height for foot in course.feet] or [0.0]
+        return sum(heights) / len(heights) - _SINKS * (max(heights) - min(heights))
 
     def root(self, place: complex, course: Course) -> complex:
         """Where the root is in the character's own frame, of where the gait's is, m.
@@ -145,3 +186,20 @@ class Stepping:
         rate = self._gait.frequency(max(speed, _LEAST_PACE * walk))
         cycles = self._gait.foot_cycles(max(speed, _EASE * walk) if course.is_moving else 0.0)
         return [footsteps.at_ease(cycle.middle, course, rate, self._height) for cycle in cycles]
+
+
+def _lift(feet: GeneralizedPosition, course: Course, cycles: Sequence[FootCycle]) -> None:
+    """Have feet swing higher, and their toes up, over whatever there is."""
+    for row, (foot, cycle) in enumerate(zip(course.feet, cycles, strict=True)):
+        hump = footsteps.hump(cycle.swung(course.phase, course.is_backward))
+        feet.position[3 * row + 2] += _HIGH * hump
+        x, y = -math.sin(foot.heading), math.cos(foot.heading)  # to the left
+        toes_up = rotations.exp(-_TOES_UP * hump * np.array((x, y, 0.0)))
+        feet.orientations_xyzw[row] = rotations.multiply(toes_up, feet.orientations_xyzw[row])
+
+
+def _tilt(slope: complex) -> FloatArray:
+    """The turn xyzw (4,), by the shortest way, from upright to the normal of a slope."""
+    upright = 1.0 / math.sqrt(1.0 + slope.real * slope.real + slope.imag * slope.imag)
+    turn = np.array((upright * slope.imag, -upright * slope.real, 0.0, 1.0 + upright))
+    return turn / math.sqrt(2.0 * (1.0 + upright))

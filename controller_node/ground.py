@@ -1,0 +1,56 @@
+"""What a controller takes for the ground."""
+
+from dataclasses import replace
+
+from controller_node.references.base import Motion
+from controller_node.references.steering.reference import SteeredReference
+from msgs_config.character.model import Character, Placement, Shape
+from msgs_config.character.terrain import terrain_shapes
+from msgs_config.errors import ConfigurationError
+from msgs_config.settings import Settings, parameter
+from msgs_config.shared_parameters import PLANE
+from msgs_config.terrain.file import read_terrain
+from msgs_config.terrain.heights import Heights
+
+FELT = "felt"
+
+
+class GroundSettings(Settings):
+    """The ground that references and planners know."""
+
+    terrain: str = parameter(
+        PLANE,
+        "what planner predictive and a steered reference take for the ground: plane; the path of "
+        "sim_node's terrain, which `run` hands over to this planner; or felt: a plane as high as "
+        "the feet that stand, whatever there is",
+    )
+
+
+(TERRAIN,) = GroundSettings.declared()
+
+
+def ground_shapes(terrain: str) -> list[Shape]:
+    """The shapes of what a parameter `terrain` names; none for a plane.
+
+    Raises:
+        CharacterError: the file cannot be used.
+    """
+    return [] if terrain in (PLANE, FELT) else terrain_shapes(read_terrain(terrain))
+
+
+def on_ground(motion: Motion, character: Character, terrain: str) -> Motion:
+    """A motion whose feet find their places on what a parameter `terrain` names, if it is steered.
+
+    Raises:
+        CharacterError: the file cannot be used.
+        ConfigurationError: the character's own world is not where the terrain's is.
+    """
+    shapes, steered = ground_shapes(terrain), motion.reference
+    if shapes and character.placement != Placement():
+        raise ConfigurationError(
+            f"parameter 'placement' is not 0; a controller that knows '{TERRAIN.name}' has the "
+            "character's own world where the terrain's is"
+        )
+    if terrain == PLANE or not isinstance(steered, SteeredReference):
+        return motion
+    return replace(motion, reference=steered.over(Heights(shapes) if shapes else None))

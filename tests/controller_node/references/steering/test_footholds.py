@@ -1,0 +1,145 @@
+"""Feet of a steered reference on uneven ground: whole on it, and over its edges on their way."""
+
+import math
+import pickle
+from functools import cache
+
+import numpy as np
+import pytest
+
+from controller_node.references.steering import footsteps
+from controller_node.references.steering.course import Footprint
+from controller_node.references.steering.footholds import Footholds
+from controller_node.references.steering.reference import SteeredReference
+from controller_node.references.steering.velocity import VelocityCommand
+from msgs_config.arrays import FloatArray
+from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.lowest_points import lowest_heights
+from tests.controller_node.references.steering.test_footsteps import FEET, HUMANOID, stands
+from tests.controller_node.references.steering.test_reference import LASTING, RATE, make, steer
+
+RISE, TREAD, EDGE = 0.15, 0.4, 1.5  # m; where the first step is
+SLOPE = math.tan(math.radians(15.0))
+
+
+class Stairs:
+    """Steps along x, without an end."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        return RISE * np.maximum(np.floor((places[:, 0] - EDGE) / TREAD) + 1.0, 0.0)
+
+
+class Slope:
+    """It rises along x and falls along y."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        return SLOPE * places[:, 0] - 0.1 * places[:, 1] + 0.2
+
+
+class Island:
+    """Ground for x below 1 alone."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        return np.where(places[:, 0] < 1.0, 0.0, np.nan)
+
+
+class Points:
+    """Nowhere even."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        return 0.05 * np.cos(100.0 * places[:, 0]) + 0.1
+
+
+def test_a_foot_stays_where_the_ground_is_even() -> None:
+    found = Footholds(HUMANOID, Stairs()).nearest(0, Footprint(0.5 + 0.1j, 0.3))
+
+    assert found.place == pytest.approx(0.5 + 0.1j, abs=0.01)
+    assert (found.height, found.slope) == (0.0, 0j)
+
+
+@pytest.mark.parametrize("x", np.arange(1.2, 2.6, 0.03).tolist())
+def test_a_foot_stands_whole_on_one_tread(x: float) -> None:
+    found = Footholds(HUMANOID, Stairs()).nearest(1, Footprint(complex(x, -0.1), 0.0))
+
+    step = round(found.height / RISE)
+    begin = EDGE + (step - 1) * TREAD if step else -math.inf
+    assert found.height == pytest.approx(RISE * step, abs=1e-9)
+    assert abs(found.slope) < 1e-9
+    assert begin + 0.05 < found.place.real < EDGE + step * TREAD - 0.05  # the ankle, well inside
+    assert abs(found.place.real - x) < 0.25
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, -2.0])
+def test_a_foot_is_as_steep_as_a_slope(heading: float) -> None:
+    found = Footholds(HUMANOID, Slope()).nearest(0, Footprint(2.0 + 1.0j, heading))
+
+    assert found.slope == pytest.approx(complex(SLOPE, -0.1), abs=1e-6)
+    x, y = found.place.real, found.place.imag
+    assert found.height == pytest.approx(SLOPE * x - 0.1 * y + 0.2, abs=1e-6)
+
+
+def test_a_foot_keeps_off_where_there_is_no_ground() -> None:
+    found = Footholds(HUMANOID, Island()).nearest(0, Footprint(0.95 + 0j, 0.0))
+
+    assert found.place.real < 0.9
+
+
+def test_where_nothing_is_even_a_foot_stands_on_what_is_highest() -> None:
+    found = Footholds(HUMANOID, Points()).nearest(0, Footprint(0j, 0.0))
+
+    assert 0.1 < found.height <= 0.15
+    assert found.slope == 0j
+
+
+def test_footholds_are_the_same_once_they_were_kept() -> None:
+    footholds = Footholds(HUMANOID, Stairs())
+    found = footholds.nearest(0, Footprint(1.6 + 0j, 0.0))
+
+    assert pickle.loads(pickle.dumps(footholds)).nearest(0, Footprint(1.6 + 0j, 0.0)) == found
+
+
+@pytest.mark.parametrize("rise", [0.15, -0.15])
+def test_a_swing_begins_and_ends_at_its_prints_and_is_above_the_line_between(rise: float) -> None:
+    shares = np.linspace(0.0, 1.0, 50).tolist()
+
+    lifts = [footsteps.clearance(each, rise * (1.0 - footsteps.eased(each))) for each in shares]
+
+    assert (lifts[0], lifts[-1]) == (0.0, 0.0)
+    assert min(lifts[1:-1]) > 0.0
+    assert max(lifts) > 0.05
+
+
+@cache
+def climbing() -> SteeredReference:
+    return steer(make(**LASTING).over(Stairs()), VelocityCommand(0, 0.6, 0.0, 0.0))
+
+
+def test_feet_stand_on_stairs_and_swing_over_their_edges() -> None:
+    reference, model = climbing(), DynamicsModel(HUMANOID)
+    deepest, highest = 0.0, 0.0
+    for tick in range(RATE, 7 * RATE, 5):
+        position = reference.sample(tick / RATE).configuration.position
+        model.update(position, np.zeros(HUMANOID.layout.size))
+        soles = lowest_heights(HUMANOID, model)[FEET]
+        ankles = model.link_poses()[0][FEET]
+        below = Stairs().at(ankles[:, :2])
+        deepest = min(deepest, float((soles - below).min()))
+        standing = np.array(stands(reference, tick))
+        highest = max(highest, float(np.abs(soles - below)[standing].max(initial=0.0)))
+
+    assert position[2] > 1.7  # six steps or more
+    assert deepest > -0.05  # below the ankles
+    assert highest < 0.06
+
+
+def test_without_heights_nothing_is_another_one() -> None:
+    class Flat:
+        def at(self, places: FloatArray) -> FloatArray:
+            return np.zeros(len(places))
+
+    plain = steer(make(**LASTING), VelocityCommand(0, 0.6, 0.0, 0.3))
+    flat = steer(make(**LASTING).over(Flat()), VelocityCommand(0, 0.6, 0.0, 0.3))
+
+    for tick in range(0, 4 * RATE, 30):
+        here, there = (each.sample(tick / RATE).configuration.position for each in (plain, flat))
+        np.testing.assert_allclose(here, there, atol=0.03)  # prints are on a grid
