@@ -158,8 +158,7 @@ def hump(swung: float) -> float:
     return 4.0 * share * (1.0 - share)
 
 
-def is_at_ease(foot: Footprint, ease: Footprint, course: Course) -> bool:
+def is_there(foot: Footprint, target: Footprint) -> bool:
     """Whether a foot is where the character needs it if it does not move."""
-    target = ease.moved_by(course.frame)
     turn = math.remainder(target.heading - foot.heading, math.tau)
     return abs(target.place - foot.place) < _NEAR and abs(turn) < _FACING

@@ -60,8 +60,8 @@ class Stepping:
             return replace(course, phase=phase, pace=abs(speed))
         speed, at_ease = self._speed(course), self._at_ease(course)
         steps = course.is_moving or not all(
-            footsteps.is_at_ease(foot, place, course)
-            for foot, place in zip(course.feet, at_ease, strict=True)
+            footsteps.is_there(foot, self._on_foothold(row, place.moved_by(course.frame)))
+            for row, (foot, place) in enumerate(zip(course.feet, at_ease, strict=True))
         )
         most = self._gait.speeds[1] / _PACE_TIME * period
         pace = course.pace + within((speed if steps else 0.0) - course.pace, most)
@@ -81,13 +81,15 @@ class Stepping:
                 continue  # it stands
             time = (cycle.to_middle(phase, backward) if now else 0.5 * cycle.duty) / rate
             target = self._where_it_stands(row, there, wanted, limits, time)
-            if self._footholds is not None:
-                target = self._footholds.nearest(row, target)
+            target = self._on_foothold(row, target)
             if was:
                 target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
             targets[row] = target
             feet[row] = foot.towards(target, footsteps.swing_share(was, now))
         return replace(there, feet=tuple(feet), targets=tuple(targets))
+
+    def _on_foothold(self, foot: int, wanted: Footprint) -> Footprint:
+        return wanted if self._footholds is None else self._footholds.nearest(foot, wanted)
 
     def _speed(self, course: Course) -> float:
         """The speed in m/s, as fast as whose cycle it steps."""

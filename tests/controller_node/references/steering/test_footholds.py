@@ -132,6 +132,17 @@ def test_feet_stand_on_stairs_and_swing_over_their_edges() -> None:
     assert highest < 0.06
 
 
+@pytest.mark.parametrize("stop", [4.5, 4.7, 4.9])
+def test_told_to_stop_on_stairs_it_comes_to_stand(stop: float) -> None:
+    command = VelocityCommand(round(stop * RATE), 0.0, 0.0, 0.0)
+    reference = climbing().steered(command, 4 * RATE).reference
+
+    here, later = (reference.sample(each).configuration.position for each in (8.0, 9.1))
+
+    np.testing.assert_allclose(here, later, atol=1e-6)
+    assert here[2] > 1.2  # amid the stairs
+
+
 def test_without_heights_nothing_is_another_one() -> None:
     class Flat:
         def at(self, places: FloatArray) -> FloatArray:
