@@ -81,7 +81,7 @@ class Controller:
 
     @property
     def needs_contacts(self) -> bool:
-        """Whether its behaviour looks at contacts."""
+        """Whether its behaviour, or a planner that feels the ground, looks at contacts."""
         return self._controller.needs_contacts
 
     def compute_effort(self, state: StampedState, contacts: FloatArray | None = None) -> FloatArray:
@@ -92,7 +92,7 @@ class Controller:
 
         Args:
             state: Of the present tick.
-            contacts: Net wrenches (links, 6) of the tick before, world axes, for behaviours.
+            contacts: Net wrenches (links, 6) of the tick before, world axes, if it looks at them.
 
         Raises:
             ActuatedCharactersError: the stamp is no tick, or contacts are missing.

@@ -237,8 +237,9 @@ class Controller:
         """The effort (n,) that answers a state, and the reference at the state's stamp.
 
         `episode_ns` is the stamp of the episode's first state, from which the reference counts; a
-        behaviour may need `contacts` (links, 6), the net wrenches of the tick before, N and N m,
-        world axes, and `opponent` (3,), where the root of its opponent is, m, world.
+        behaviour or planner may need `contacts` (links, 6), the net wrenches of the tick before, N
+        and N m, world axes, and a behaviour `opponent` (3,), where the root of its opponent is, m,
+        world.
 
         Raises:
             ClockError: the state's stamp is no tick at this controller's rate.

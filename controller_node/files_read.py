@@ -8,7 +8,7 @@ from controller_node.behaviours.onnx_policy.factory import ONNX, policy_files
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
 from controller_node.controller_settings import LawSettings
-from controller_node.ground import FELT, GroundSettings
+from controller_node.ground import FELT, GroundSettings, terrain_path
 from controller_node.planner.settings import HYBRID, POLICY, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -45,7 +45,7 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
 
         files |= policies_read(character, values, clips)
     if (terrain := GroundSettings.of(values).terrain) not in (PLANE, FELT):
-        files["terrain"] = Path(terrain)
+        files["terrain"] = terrain_path(terrain)
     if feedforward := LawSettings.of(values).feedforward:
         files["feedforward"] = Path(feedforward)
     return files

@@ -1,9 +1,11 @@
 """What a controller takes for the ground."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from controller_node.references.base import Motion
 from controller_node.references.steering.reference import SteeredReference
+from msgs_config import files
 from msgs_config.character.model import Character, Placement, Shape
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.errors import ConfigurationError
@@ -33,9 +35,26 @@ def ground_shapes(terrain: str) -> list[Shape]:
     """The shapes of what a parameter `terrain` names; none for a plane.
 
     Raises:
-        CharacterError: the file cannot be used.
+        ActuatedCharactersError: the file cannot be used, or there is none.
     """
-    return [] if terrain in (PLANE, FELT) else terrain_shapes(read_terrain(terrain))
+    if terrain in (PLANE, FELT):
+        return []
+    return terrain_shapes(read_terrain(str(terrain_path(terrain))))
+
+
+def terrain_path(terrain: str) -> Path:
+    """The file that a parameter `terrain` names.
+
+    Raises:
+        ConfigurationError: there is none; says what else the parameter may be.
+    """
+    path = files.resolve(terrain, Path.cwd(), ConfigurationError)
+    if not path.is_file():
+        raise ConfigurationError(
+            f"controller_node's '{TERRAIN.name}' is {terrain}; it must be {PLANE}, {FELT} or the "
+            f"path of a file, and there is no {path}"
+        )
+    return path
 
 
 def on_ground(motion: Motion, character: Character, terrain: str) -> Motion:

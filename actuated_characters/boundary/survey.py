@@ -93,7 +93,11 @@ class Survey:
     def differences(self, done: Mapping[int, Done]) -> list[str]:
         """A line for each run that became something else when it was made once more."""
         pairs = [(end, row) for end, row in self.shown().values() if row.number in done]
-        lines = [_difference(done[end.number], done[row.number]) for end, row in pairs]
+        ends_at_falls = self.search.figure == FELL
+        lines = [
+            _difference(done[end.number], done[row.number], ends_at_fall=ends_at_falls)
+            for end, row in pairs
+        ]
         return list(filter(None, lines))
 
     def _learn(self, point: Point, done: Mapping[int, Done]) -> None:
@@ -150,14 +154,14 @@ def _whole(found: Survey, directory: Path) -> Job:
     return Job([row for _, row in found.shown().values()], directory, found.search.bags)
 
 
-def _difference(tried: Done, whole: Done) -> str:
+def _difference(tried: Done, whole: Done, *, ends_at_fall: bool) -> str:
     """The first thing that one of two runs says otherwise than the other; empty: nothing.
 
     Where the one ended with the fall, the other one may fail after it.
     """
     first, second = tried.outcome, whole.outcome
     both = [(name, first.figures.get(name), second.figures.get(name)) for name in first.figures]
-    if first.figures.get(FELL) is not True:
+    if not (ends_at_fall and first.figures.get(FELL) is True):
         both.append(("error", first.error or None, second.error or None))
     said = (
         f"{name} of row {whole.number} is {other}, of row {tried.number}, the same run, {one}"

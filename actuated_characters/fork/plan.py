@@ -26,8 +26,8 @@ from actuated_characters.runs.planned.inputs import PlannedInputs
 from actuated_characters.runs.planned.throws import PlannedThrow, plan_throws
 from actuated_characters.runs.planned.wrenches import PlannedPush, parse_push
 from controller_node import parameters as controller_parameters
+from controller_node.behaviours.factory import make_motion
 from controller_node.references.base import Reference, ReferenceState
-from controller_node.references.factory import make_motion
 from msgs_config.errors import ConfigurationError, RecordingError, one_of
 from msgs_config.messages import topics
 from msgs_config.messages.clock import FIRST_TICK, TickClock

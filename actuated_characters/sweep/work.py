@@ -169,7 +169,7 @@ def compared(done: Done, again: Done) -> Verified:
     names = [name for name in first | second if first.get(name) != second.get(name)]
     if not names:
         return Verified(done.number, "", again.by)
-    # the hash says it best: figures are rounded, and an error comes with none at all
+    # the hash says it best: figures are rounded, and an error may come with none at all
     name = "state_hash" if "state_hash" in names else names[0]
     difference = f"{name} is {first.get(name)!r} by {done.by}, {second.get(name)!r} by {again.by}"
     return Verified(done.number, difference, again.by)

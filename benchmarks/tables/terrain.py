@@ -6,13 +6,13 @@ import numpy as np
 import yaml
 
 from benchmarks.tables.case import Case, Fact
-from benchmarks.tables.machines import steps_urdf
+from benchmarks.tables.machines import STEP_LENGTH, steps_urdf
 from benchmarks.tables.many import Options, RunTable
 from benchmarks.tables.planned import planner
 from benchmarks.tables.seen import Seen
 
 RISE, STEPS, ANGLE = 0.15, 4, 15.0  # m, of stairs; degrees, of slopes
-BLIND_STEP, BLIND_STEPS = 0.05, 12  # m up or down, every 0.8 m
+BLIND_STEP, BLIND_STEPS = 0.05, 5  # m up or down, every 0.8 m
 BLIND_SPEED = 0.5  # m/s
 BEYOND = 0.8  # m that it goes on for
 
@@ -27,8 +27,8 @@ def terrain_cases(kind: str, options: Options) -> Iterator[Case]:
         if kind == "blind":
             heights = np.cumsum(BLIND_STEP * rng.choice((-1.0, 1.0), BLIND_STEPS)).tolist()
             ground.write_text(steps_urdf(heights, begin))
-            end, controller = begin + 3.2, controller | {"terrain": "felt"}
-            speed = BLIND_SPEED
+            end, speed = begin + STEP_LENGTH * (BLIND_STEPS - 1), BLIND_SPEED
+            controller |= {"terrain": "felt"}
         else:
             tread = round(float(rng.uniform(0.35, 0.45)), 3)
             piece: dict[str, object] = {"at": [begin, 0.0], "width": 4.0, "landing": 1.5}

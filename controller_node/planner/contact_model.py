@@ -43,7 +43,7 @@ _LIMIT = (0.01, 1.0)  # time constant in s and damping ratio of the limits of hi
 
 _UNUSED_PARTS = ("AUTORESET", "ISLAND", "SPRING", "DAMPER", "ACTUATION", "SENSOR")  # MuJoCo's parts
 
-_STANDS = 20.0  # N upwards on a foot that stands, at least
+_STANDS = 0.05  # of the weight, upwards on a foot that stands, at least
 
 _GROUND = "ground"
 _DOWN = np.array((0.0, 0.0, -1.0))
@@ -78,8 +78,7 @@ class ContactModel:
         self._character = character
         self._period_s = period_s
         self._has_own_contacts = contact == OWN_CONTACTS
-        has_planes = plane_each and self._has_own_contacts
-        own_planes = [character.links[each].name for each in _feet(character) if has_planes]
+        own_planes = [character.links[each].name for each in _feet(character) if plane_each]
         compile_model = _compile if self._has_own_contacts else _compile_world
         self._model = compile_model(character, period_s, gravity, friction, terrain, own_planes)
         self._planes = [self._model.geom(_plane_of(foot)).id for foot in own_planes]
@@ -130,12 +129,13 @@ class ContactModel:
         data = self._looked_at
         data.qpos[:] = position
         mujoco.mj_kinematics(self._model, data)
+        weight = self._character.mass * -self._model.opt.gravity[2]
         heights = []
         for index in _feet(self._character):
             turn = rotations.xyzw_from_wxyz(data.xquat[index + 1])
             shapes = self._character.links[index].collision_shapes
             below = max((farthest(each, turn, _DOWN) for each in shapes), default=0.0)
-            stands = contacts[index, 2] > _STANDS
+            stands = contacts[index, 2] > _STANDS * weight
             heights.append(data.xpos[index + 1, 2] - below if stands else np.nan)
         return np.array(heights)
 

@@ -15,6 +15,7 @@ from controller_node.planner.settings import (
     PREDICTIVE,
     RECORDED,
     PlannerParameters,
+    check_ground,
     check_planner,
     make_planner_settings,
 )
@@ -38,6 +39,7 @@ def check_planning(character: Character, values: Values, clips: Sequence[str]) -
     if name == NO_PLANNER:
         return
     check_planner(character, name)
+    check_ground(character, PlannerParameters.of(values))
     if name == RECORDED:
         _recorded_plan(character, values)
         return
@@ -61,6 +63,7 @@ def make_planner(character: Character, values: Values, clips: Sequence[str]) -> 
         return None
     check_planner(character, name)
     given = PlannerParameters.of(values)
+    check_ground(character, given)
     if name == RECORDED:
         plan = _recorded_plan(character, values)
         return RecordedPlanner(plan, make_commands_in_flight(character, given))

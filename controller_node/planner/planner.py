@@ -334,7 +334,9 @@ class PredictivePlanner:
     def _feel(self, position: FloatArray, contacts: FloatArray | None) -> None:
         """Have the ground of both models where the feet stand in a position (q,)."""
         if contacts is None:
-            raise ConfigurationError(f"'{TERRAIN.name}' {FELT} needs each state's contacts")
+            raise ConfigurationError(
+                f"'{TERRAIN.name}' {FELT} needs the contacts of each state's tick"
+            )
         ground = self.anchor.ground.after(self._model.soles(position, contacts))
         self.anchor = replace(self.anchor, ground=ground)
         for model in (self._model, self._stepped):

@@ -156,6 +156,25 @@ def check_planner(character: Character, planner: str) -> None:
         )
 
 
+def check_ground(character: Character, given: PlannerParameters) -> None:
+    """Raise ConfigurationError if a planner cannot do with its ground."""
+    if given.terrain != PLANE and given.planner != PREDICTIVE:
+        raise ConfigurationError(
+            f"controller_node's '{TERRAIN.name}' is {given.terrain}, and planner '{given.planner}' "
+            f"knows the ground at z = 0 alone; it must be {PLANE}"
+        )
+    wrong = {
+        f"'{character.name}' has no feet in its file": not character.feet,
+        f"'{COMMAND_DELAY.name}' is {given.delay}; it must be 0": given.delay > 0,
+        f"'plan.contact' is {given.contact}; it must be {OWN_CONTACTS}": (
+            given.contact != OWN_CONTACTS
+        ),
+    }
+    if given.terrain == FELT:
+        for sentence in (each for each, is_so in wrong.items() if is_so):
+            raise ConfigurationError(f"'{TERRAIN.name}' is {FELT}, but {sentence}")
+
+
 def make_planner_settings(character: Character, values: Values) -> PlannerSettings:
     """The settings of planning ahead. Raises ConfigurationError if times contradict each other."""
     given = PlannerParameters.of(values)

@@ -73,8 +73,9 @@ class Footholds:
     def _standing(self, foot: int, wanted: Footprint) -> tuple[float, Footprint]:
         """How far the ground below a sole is off a plane, m, and the print on that plane.
 
-        The plane is that of least squares (the places below a sole are a regular grid); where the
-        ground is none, the foot stands level on its highest place.
+        The plane is that of least squares (the places below a sole are a regular grid). Where the
+        ground is no plane, the foot stands level on its highest place; without ground below all of
+        the sole the print is the wanted one.
         """
         sole, heading = self._soles[foot], cmath.rect(1.0, wanted.heading)
         places = wanted.place + heading * sole

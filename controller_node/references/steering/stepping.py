@@ -26,6 +26,7 @@ _LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are li
 _EASE = 0.5  # of it: slower steps are as narrow as those
 _AIM_TIME_CONSTANT = 0.1  # s, of a foot's aim that another command changes as it swings
 _PACE_TIME = 0.4  # s in which the pace changes by the slowest captured speed, at least
+_DECIDED = 0.5  # of a swing, from which on a foot keeps to the foothold that it has found
 _HIGH, _TOES_UP = 0.1, 0.4  # m and rad: how much higher a foot swings over ground that it feels
 _SINKS = 0.2  # m that the root sinks for each m from a foot to the other
 
@@ -47,7 +48,8 @@ class Stepping:
 
     def standing(self) -> Course:
         """Standing at the origin."""
-        feet = tuple(cycle.middle for cycle in self._gait.foot_cycles(0.0))
+        cycles = enumerate(self._gait.foot_cycles(0.0))
+        feet = tuple(self._on_foothold(row, cycle.middle) for row, cycle in cycles)
         return Course(feet=feet, targets=feet)
 
     def advanced(
@@ -84,6 +86,10 @@ class Stepping:
             target = self._on_foothold(row, target)
             if was:
                 target = targets[row].towards(target, min(period / _AIM_TIME_CONSTANT, 1.0))
+            if self._footholds is not None and max(was, now) >= _DECIDED:
+                # Between two footholds there may be none.
+                is_found = was >= _DECIDED
+                target = targets[row] if is_found else self._on_foothold(row, target)
             targets[row] = target
             feet[row] = foot.towards(target, footsteps.swing_share(was, now))
         return replace(there, feet=tuple(feet), targets=tuple(targets))
@@ -130,7 +136,8 @@ class Stepping:
             places[3 * row : 3 * row + 2] = place.real, place.imag
         placed = GeneralizedPosition(places, rotations.multiply(about_z, feet.orientations_xyzw))
         if self._is_high:
-            _lift(placed, course, cycles)
+            shown = min(course.pace / (_LEAST_PACE * self._gait.speeds[1]), 1.0)
+            _lift(placed, course, cycles, shown)
         if self._footholds is not None:
             self._put_on_ground(placed, course, cycles)
         return placed
@@ -190,10 +197,12 @@ class Stepping:
         return [footsteps.at_ease(cycle.middle, course, rate, self._height) for cycle in cycles]
 
 
-def _lift(feet: GeneralizedPosition, course: Course, cycles: Sequence[FootCycle]) -> None:
-    """Have feet swing higher, and their toes up, over whatever there is."""
+def _lift(
+    feet: GeneralizedPosition, course: Course, cycles: Sequence[FootCycle], share: float
+) -> None:
+    """Have feet swing higher, and their toes up, by a share: over whatever there is."""
     for row, (foot, cycle) in enumerate(zip(course.feet, cycles, strict=True)):
-        hump = footsteps.hump(cycle.swung(course.phase, course.is_backward))
+        hump = share * footsteps.hump(cycle.swung(course.phase, course.is_backward))
         feet.position[3 * row + 2] += _HIGH * hump
         x, y = -math.sin(foot.heading), math.cos(foot.heading)  # to the left
         toes_up = rotations.exp(-_TOES_UP * hump * np.array((x, y, 0.0)))

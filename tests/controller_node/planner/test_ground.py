@@ -16,7 +16,6 @@ from controller_node.parameters import check_world, make_controller, resolve_for
 from controller_node.planner.anchor import Anchor
 from controller_node.planner.contact_model import ContactModel
 from controller_node.planner.felt_ground import FeltGround
-from controller_node.references.steering.reference import SteeredReference
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Pose, Shape, ShapeType
@@ -182,20 +181,61 @@ def test_what_is_felt_needs_contacts() -> None:
     controller = make_controller(HUMANOID, plan.reference, values)
 
     assert controller.needs_contacts
-    with pytest.raises(ConfigurationError, match="needs each state's contacts"):
+    with pytest.raises(ConfigurationError, match="needs the contacts of each"):
         controller.compute_effort(StampedState(0, REST, np.zeros(len(REST)), None), 0)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (
+            {"planner": "hybrid", "terrain": FELT},
+            "knows the ground at z = 0 alone; it must be plane",
+        ),
+        ({"planner": "policy", "terrain": "a.yaml"}, "must be plane, felt or the path of a file"),
+        ({"terrain": FELT, "command_delay_ticks": 1}, "'command_delay_ticks' is 1; it must be 0"),
+        ({"terrain": FELT, "plan.contact": "world"}, "'plan.contact' is world; it must be own"),
+        ({"terrain": "flet"}, "'terrain' is flet; it must be plane, felt or the path of a file"),
+    ],
+)
+def test_what_cannot_be_is_refused(given: Mapping[str, object], sentence: str) -> None:
+    controller = {"planner": "predictive", **given}
+
+    with pytest.raises(ConfigurationError, match=sentence):
+        make_plan("humanoid", 1.0, {"reference": "steered"}, {}, controller)
+
+
+def test_who_has_no_feet_feels_no_ground() -> None:
+    given = {"planner": "predictive", "terrain": FELT}
+
+    with pytest.raises(ConfigurationError, match="'laikago' has no feet in its file"):
+        make_plan("laikago", 1.0, {"reference": "clip", "clip": "walk"}, {}, given)
+
+
+def arrives(plan: RunPlan) -> float:
+    """How far a walk gets, m, which must not fall."""
+    terrain = make_simulation_settings(plan.simulator).world.terrain
+    watch = FallWatch(PostureReader(HUMANOID, terrain), 240.0)
+    for tick in ticks_in_process(plan):
+        position = tick.following.position
+        assert not watch.has_fallen(position)
+    return float(position[0])
+
+
+@pytest.mark.slow
+def test_it_walks_over_a_plate_that_it_feels(tmp_path: Path) -> None:
+    (tmp_path / "plate.yaml").write_text("boxes: [{at: [1.5, 0], size: [0.8, 4, 0.05]}]")
+    plan = make_plan(
+        "humanoid",
+        5.5,
+        {"reference": "steered"},
+        {"terrain": str(tmp_path / "plate.yaml")},
+        {"planner": "predictive", "plan.workers": 1, "plan.step": 0.009, "terrain": FELT},
+    )
+
+    assert arrives(plan_velocities(plan, "0.5,0,0@0.2")[0]) > 2.2
 
 
 @pytest.mark.slow
 def test_it_walks_up_steps_that_it_knows(tmp_path: Path) -> None:
-    plan = walk(tmp_path, 5.5)
-    terrain = make_simulation_settings(plan.simulator).world.terrain
-    watch = FallWatch(PostureReader(HUMANOID, terrain), 240.0)
-    assert isinstance(plan.reference, SteeredReference)
-
-    for tick in ticks_in_process(plan):
-        position = tick.following.position
-        assert not watch.has_fallen(position)
-
-    assert position[0] > 2.4
-    assert position[2] > 0.3 + 0.75
+    assert arrives(walk(tmp_path, 5.5)) > 2.4

@@ -132,6 +132,50 @@ def test_feet_stand_on_stairs_and_swing_over_their_edges() -> None:
     assert highest < 0.06
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_feet_come_down_on_one_tread_whatever_is_commanded(seed: int) -> None:
+    draw, reference = np.random.default_rng(seed), climbing()
+    landings = 0
+    for tick in range(0, 10 * RATE, RATE // 2):
+        speed, turn = draw.uniform(0.2, 0.8), draw.uniform(-0.4, 0.4)
+        reference = reference.steered(VelocityCommand(tick, speed, 0.0, turn), tick).reference
+        for each in range(tick + 1, tick + RATE // 2 - 1):
+            before, here, after = (reference.course(each + by).feet for by in (-1, 0, 1))
+            for foot, was, will in zip(here, before, after, strict=True):
+                if was == foot or foot != will:
+                    continue  # it stands, or swings on
+                step = round(foot.height / RISE)
+                assert foot.height == pytest.approx(RISE * step, abs=1e-6)
+                assert Stairs().at(np.array([[foot.place.real, 0.0]])) == pytest.approx(foot.height)
+                landings += 1
+
+    assert landings > 10
+
+
+def test_who_stops_on_what_it_feels_has_both_feet_flat() -> None:
+    high = steer(make(**LASTING).over(None), VelocityCommand(0, 0.6, 0.0, 0.0))
+    model, soles = DynamicsModel(HUMANOID), []
+    for stop in range(600, 880, 40):
+        stopped = high.steered(VelocityCommand(stop, 0.0, 0.0, 0.0), stop).reference
+        model.update(
+            stopped.sample(stop / RATE + 6.0).configuration.position, np.zeros(HUMANOID.layout.size)
+        )
+        soles.append(lowest_heights(HUMANOID, model)[FEET])
+
+    np.testing.assert_allclose(soles, 0.0, atol=0.004)
+
+
+def test_it_begins_as_high_as_the_ground() -> None:
+    class Block:
+        def at(self, places: FloatArray) -> FloatArray:
+            return np.full(len(places), 0.3)
+
+    low, high = make(**LASTING), make(**LASTING).over(Block())
+
+    rise = high.sample(0.0).configuration.position - low.sample(0.0).configuration.position
+    assert rise[2] == pytest.approx(0.3)
+
+
 @pytest.mark.parametrize("stop", [4.5, 4.7, 4.9])
 def test_told_to_stop_on_stairs_it_comes_to_stand(stop: float) -> None:
     command = VelocityCommand(round(stop * RATE), 0.0, 0.0, 0.0)
@@ -153,4 +197,4 @@ def test_without_heights_nothing_is_another_one() -> None:
 
     for tick in range(0, 4 * RATE, 30):
         here, there = (each.sample(tick / RATE).configuration.position for each in (plain, flat))
-        np.testing.assert_allclose(here, there, atol=0.03)  # prints are on a grid
+        np.testing.assert_allclose(here, there, atol=0.05)  # prints are on a grid
