@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from msgs_config.arrays import FloatArray
+from msgs_config.geometry import fixed_order
 
 _SAME = 0.005  # m: what differs by less is as high
 
@@ -18,7 +19,7 @@ class FeltGround:
     @property
     def level(self) -> float:
         """How high it is in the mean, m."""
-        return sum(self.heights) / len(self.heights) if self.heights else 0.0
+        return float(fixed_order.mean(np.array(self.heights))) if self.heights else 0.0
 
     @property
     def planes(self) -> FloatArray:
@@ -30,5 +31,5 @@ class FeltGround:
         planes, stand = np.array(self.heights or (0.0,) * len(soles)), ~np.isnan(soles)
         if stand.any():
             planes = np.where(stand & (np.abs(soles - planes) >= _SAME), soles, planes)
-            planes[~stand] = sum(planes[stand].tolist()) / int(stand.sum())
+            planes[~stand] = fixed_order.mean(planes[stand])
         return FeltGround(tuple(planes.tolist()))

@@ -31,6 +31,7 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
         *(f"msgs_config/character/mjcf/{name}.py" for name in ("shapes", "urdf")),
         "msgs_config/character/mujoco_model.py",
         "msgs_config/character/mujoco_world.py",
+        "msgs_config/terrain/heights.py",
         "msgs_config/compiled/data_layout.py",
         "msgs_config/compiled/mujoco_functions.py",
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("balls", "body", "contacts")),

@@ -148,7 +148,8 @@ def clearance(swung: float, left: float) -> float:
     if share == 1.0:
         return 0.0
     rise = left / (1.0 - share)
-    sooner = 1.0 - (1.0 - share) ** 3 if rise > 0.0 else share**3
+    rest = 1.0 - share
+    sooner = 1.0 - rest * rest * rest if rise > 0.0 else share * share * share
     return rise * (sooner - share) + min(_LIFT * abs(rise), _MOST_LIFT) * hump(swung)
 
 

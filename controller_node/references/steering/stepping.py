@@ -20,7 +20,7 @@ from controller_node.references.steering.velocity import (
 )
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import GeneralizedPosition
-from msgs_config.geometry import rotations
+from msgs_config.geometry import fixed_order, rotations
 
 _LEAST_PACE = 0.7  # of the slowest captured speed: steps that are slower are lifted as those
 _EASE = 0.5  # of it: slower steps are as narrow as those
@@ -164,7 +164,8 @@ class Stepping:
         A leg whose foot stays a step below does not reach it else.
         """
         heights = [foot.height for foot in course.feet] or [0.0]
-        return sum(heights) / len(heights) - _SINKS * (max(heights) - min(heights))
+        mean = float(fixed_order.mean(np.array(heights)))
+        return mean - _SINKS * (max(heights) - min(heights))
 
     def root(self, place: complex, course: Course) -> complex:
         """Where the root is in the character's own frame, of where the gait's is, m.
