@@ -79,8 +79,10 @@ class ContactModel:
         self._period_s = period_s
         self._has_own_contacts = contact == OWN_CONTACTS
         own_planes = [character.links[each].name for each in _feet(character) if plane_each]
-        compile_model = _compile if self._has_own_contacts else _compile_world
-        self._model = compile_model(character, period_s, gravity, friction, terrain, own_planes)
+        world = (character, period_s, gravity, friction, terrain)
+        self._model = (
+            _compile(*world, own_planes) if self._has_own_contacts else _compile_world(*world)
+        )
         self._planes = [self._model.geom(_plane_of(foot)).id for foot in own_planes]
         self.put_planes(np.zeros(len(own_planes)))
         self._looked_at = mujoco.MjData(self._model)
@@ -300,7 +302,6 @@ def _compile_world(
     gravity: float,
     friction: float,
     terrain: Sequence[Shape],
-    own_planes: Sequence[str],
 ) -> mujoco.MjModel:
     """As engine MuJoCo has it with its defaults, where a step is a tick."""
     spec = mujoco.MjSpec()
