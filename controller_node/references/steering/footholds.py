@@ -15,7 +15,7 @@ from msgs_config.character.extents import farthest
 from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 
-_MARGIN = 0.02  # m of even ground around a sole
+_MARGIN, _BEHIND = 0.02, 0.04  # m of even ground around a sole, and behind it
 _LENGTHS, _WIDTHS = 7, 3  # places that are looked at below a sole: so many along, so many across
 _GRID, _TURN = 0.01, 0.02  # m and rad: prints nearer to each other than this are one
 _STEP, _STEPS = 0.02, 10  # m from one print that is tried to the next, and how many to each side
@@ -102,12 +102,17 @@ def _soles(character: Character) -> list[FloatArray]:
     soles = []
     for name, turn in zip(character.feet, turns, strict=True):
         back, ahead, right, left = (
-            _MARGIN
+            margin
             + max(
                 (farthest(each, turn, np.array(way)) for each in links[name].collision_shapes),
                 default=0.0,
             )
-            for way in ((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
+            for margin, *way in (
+                (_BEHIND, -1.0, 0.0, 0.0),
+                (_MARGIN, 1.0, 0.0, 0.0),
+                (_MARGIN, 0.0, -1.0, 0.0),
+                (_MARGIN, 0.0, 1.0, 0.0),
+            )
         )
         along = -back + (ahead + back) * np.arange(_LENGTHS) / (_LENGTHS - 1)
         across = -right + (left + right) * np.arange(_WIDTHS) / (_WIDTHS - 1)

@@ -10,7 +10,7 @@ this is what the cycle does itself.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from controller_node.references.steering.course import GRAVITY, Course, Footprint
 from msgs_config.arrays import FloatArray
@@ -19,6 +19,7 @@ from msgs_config.geometry import rotations
 _STANDING = 0.35  # share of the mean speed over the ground, below which a foot stands
 _STRAY = 0.1  # share of a cycle in which a foot may do otherwise than once a cycle
 _LIFT, _MOST_LIFT = 0.25, 0.04  # of a rise, and m: how far a foot is lifted over an edge
+_HIGH, _SOONER = 0.1, 0.3  # m of an edge down, and share of a swing: so much sooner it is ahead
 _NEAR, _FACING = 0.01, 0.05  # m and rad from where it stands at ease, at which a foot is there
 
 
@@ -126,31 +127,59 @@ def sway(cycle: FootCycle, phase: float, frequency: float, height: float) -> flo
     return 1.0 - math.cosh(rate * (since - half) / frequency) / math.cosh(rate * half / frequency)
 
 
-def swing_share(was: float, now: float) -> float:
+def swung_on(foot: Footprint, target: Footprint, was: float, now: float) -> Footprint:
+    """A foot that swings, a tick later on its way to where it comes down.
+
+    Its height goes evenly with its way, but sinks over an edge while the foot is ahead already.
+
+    Args:
+        foot: Where it was.
+        target: Where it comes down.
+        was: How much of its swing was done, from 0 to 1.
+        now: How much is; 0 once it has come down.
+    """
+    along, edge = _rise(foot, target)
+    drop = -edge / (1.0 - eased(was)) if was < 1.0 else 0.0
+    in_time = 1.0 - _SOONER * min(max(drop, 0.0) / _HIGH, 1.0)
+    share = _swing_share(min(was / in_time, 1.0), min(now / in_time, 1.0))
+    height = foot.height + share * along + _swing_share(was, now) * edge
+    return replace(foot.towards(target, share), height=height)
+
+
+def clearance(foot: Footprint, target: Footprint, swung: float) -> float:
+    """How much higher than its print a foot swings over an edge, m.
+
+    It rises early, and sinks late, when its heel is past the edge; over either it is lifted.
+
+    Args:
+        foot: Where it is.
+        target: Where it comes down.
+        swung: How much of its swing is done, from 0 to 1.
+    """
+    share = eased(swung)
+    if share == 1.0:
+        return 0.0
+    rest, cube = 1.0 - share, share * share * share
+    _, edge = _rise(foot, target)
+    over = 1.0 - rest * rest * rest if edge > 0.0 else cube * cube * cube * cube
+    rise = edge / rest
+    return rise * (over - share) + min(_LIFT * abs(rise), _MOST_LIFT) * hump(swung)
+
+
+def _rise(foot: Footprint, target: Footprint) -> tuple[float, float]:
+    """How much higher a foot comes down than it is, m: what a slope rises, and what edges do."""
+    slope = 0.5 * (foot.slope + target.slope)
+    along = (slope.conjugate() * (target.place - foot.place)).real
+    return along, target.height - foot.height - along
+
+
+def _swing_share(was: float, now: float) -> float:
     """The share of the way that is left which a foot goes in a tick, of what of its swing is done.
 
     Both are from 0 to 1; `now` is 0 once it has come down.
     """
     left = 1.0 - eased(was)
     return 1.0 - (1.0 - eased(now)) / left if now > 0.0 and left > 0.0 else 1.0
-
-
-def clearance(swung: float, left: float) -> float:
-    """How much higher than on a straight line a foot swings from one height to another, m.
-
-    It rises early and sinks late, and over either edge it is lifted as well.
-
-    Args:
-        swung: How much of its swing is done, from 0 to 1.
-        left: m that it still has to rise on the straight line.
-    """
-    share = eased(swung)
-    if share == 1.0:
-        return 0.0
-    rise = left / (1.0 - share)
-    rest = 1.0 - share
-    sooner = 1.0 - rest * rest * rest if rise > 0.0 else share * share * share
-    return rise * (sooner - share) + min(_LIFT * abs(rise), _MOST_LIFT) * hump(swung)
 
 
 def hump(swung: float) -> float:

@@ -91,7 +91,7 @@ class Stepping:
                 is_found = was >= _DECIDED
                 target = targets[row] if is_found else self._on_foothold(row, target)
             targets[row] = target
-            feet[row] = foot.towards(target, footsteps.swing_share(was, now))
+            feet[row] = footsteps.swung_on(foot, target, was, now)
         return replace(there, feet=tuple(feet), targets=tuple(targets))
 
     def _on_foothold(self, foot: int, wanted: Footprint) -> Footprint:
@@ -150,10 +150,9 @@ class Stepping:
         for row, (foot, target, cycle) in enumerate(pairs):
             tilt = _tilt(foot.slope)
             swung = cycle.swung(course.phase, course.is_backward)
-            left = target.height - foot.height
             above: FloatArray = np.array((0.0, 0.0, feet.position[3 * row + 2]))
             above = rotations.rotate(tilt, above)
-            above[2] += foot.height + (footsteps.clearance(swung, left) if swung else 0.0)
+            above[2] += foot.height + (footsteps.clearance(foot, target, swung) if swung else 0.0)
             feet.position[3 * row : 3 * row + 2] += above[:2]
             feet.position[3 * row + 2] = above[2]
             feet.orientations_xyzw[row] = rotations.multiply(tilt, feet.orientations_xyzw[row])

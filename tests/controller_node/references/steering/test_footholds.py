@@ -1,5 +1,6 @@
 """Feet of a steered reference on uneven ground: whole on it, and over its edges on their way."""
 
+import itertools
 import math
 import pickle
 from functools import cache
@@ -15,6 +16,8 @@ from controller_node.references.steering.velocity import VelocityCommand
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.lowest_points import lowest_heights
+from msgs_config.character.model import ShapeType
+from msgs_config.geometry import rotations
 from tests.controller_node.references.steering.test_footsteps import FEET, HUMANOID, stands
 from tests.controller_node.references.steering.test_reference import LASTING, RATE, make, steer
 
@@ -27,6 +30,13 @@ class Stairs:
 
     def at(self, places: FloatArray) -> FloatArray:
         return RISE * np.maximum(np.floor((places[:, 0] - EDGE) / TREAD) + 1.0, 0.0)
+
+
+class StairsDown:
+    """Steps down along x, without an end."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        return -RISE * np.maximum(np.floor((places[:, 0] - EDGE) / TREAD) + 1.0, 0.0)
 
 
 class Slope:
@@ -98,15 +108,42 @@ def test_footholds_are_the_same_once_they_were_kept() -> None:
     assert pickle.loads(pickle.dumps(footholds)).nearest(0, Footprint(1.6 + 0j, 0.0)) == found
 
 
+def swing(target: Footprint) -> tuple[FloatArray, list[Footprint]]:
+    """How much higher (50,) than its prints a foot is that swings from the origin, m, and those."""
+    shares = np.linspace(0.0, 1.0, 50).tolist()
+    feet = [Footprint(0j, 0.0, slope=target.slope)]
+    for was, now in itertools.pairwise(shares):
+        feet.append(footsteps.swung_on(feet[-1], target, was, now))
+    lifts = [footsteps.clearance(*each) for each in zip(feet, [target] * 50, shares, strict=True)]
+    return np.array(lifts), feet
+
+
 @pytest.mark.parametrize("rise", [0.15, -0.15])
 def test_a_swing_begins_and_ends_at_its_prints_and_is_above_the_line_between(rise: float) -> None:
-    shares = np.linspace(0.0, 1.0, 50).tolist()
-
-    lifts = [footsteps.clearance(each, rise * (1.0 - footsteps.eased(each))) for each in shares]
+    target = Footprint(0.7 + 0.1j, 0.3, rise)
+    lifts, feet = swing(target)
 
     assert (lifts[0], lifts[-1]) == (0.0, 0.0)
-    assert min(lifts[1:-1]) > 0.0
-    assert max(lifts) > 0.05
+    assert lifts[1:-1].min() > 0.0
+    assert lifts.max() > 0.05
+    assert feet[-1].place == pytest.approx(target.place)
+    assert feet[-1].height == pytest.approx(rise)
+
+
+def test_down_from_an_edge_a_foot_is_ahead_sooner_than_on_the_flat() -> None:
+    down, flat = (swing(Footprint(0.7 + 0j, 0.0, rise))[1] for rise in (-0.15, 0.0))
+
+    ahead = [here.place.real - there.place.real for here, there in zip(down, flat, strict=True)]
+    assert min(ahead) >= 0.0
+    assert max(ahead) > 0.1
+
+
+def test_along_a_slope_a_foot_goes_as_that_does() -> None:
+    lifts, feet = swing(Footprint(0.7 + 0j, 0.0, -0.7 * SLOPE, -SLOPE + 0j))
+
+    np.testing.assert_allclose(lifts, 0.0, atol=1e-12)
+    for foot in feet:
+        assert foot.height == pytest.approx(-SLOPE * foot.place.real, abs=1e-12)
 
 
 @cache
@@ -130,6 +167,35 @@ def test_feet_stand_on_stairs_and_swing_over_their_edges() -> None:
     assert position[2] > 1.7  # six steps or more
     assert deepest > -0.05  # below the ankles
     assert highest < 0.06
+
+
+CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+
+
+def corners_of(model: DynamicsModel, foot: int) -> FloatArray:
+    """Corners (8, 3) of a foot's box in the world, m."""
+    (box,) = HUMANOID.links[foot].collision_shapes
+    assert box.type is ShapeType.BOX
+    places, turns = model.link_poses()
+    own = np.array(box.pose.position) + rotations.rotate(
+        np.array(box.pose.orientation_xyzw), CORNERS * np.array(box.size)
+    )
+    return places[foot] + rotations.rotate(turns[foot], own)
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.6])
+def test_heels_are_past_an_edge_before_they_sink_below_it(speed: float) -> None:
+    reference = steer(make(**LASTING).over(StairsDown()), VelocityCommand(0, speed, 0.0, 0.0))
+    model, deepest = DynamicsModel(HUMANOID), 0.0
+    for tick in range(RATE, 7 * RATE, 2):
+        position = reference.sample(tick / RATE).configuration.position
+        model.update(position, np.zeros(HUMANOID.layout.size))
+        for foot in FEET:
+            corners = corners_of(model, foot)
+            deepest = min(deepest, float((corners[:, 2] - StairsDown().at(corners)).min()))
+
+    assert position[2] < 0.2  # five steps or more
+    assert deepest > -0.02
 
 
 @pytest.mark.parametrize("seed", range(4))
