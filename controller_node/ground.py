@@ -1,11 +1,15 @@
 """What a controller takes for the ground."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from controller_node.references.base import Motion
 from controller_node.references.steering.reference import SteeredReference
 from msgs_config import files
+from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Placement, Shape
 from msgs_config.character.terrain import terrain_shapes
 from msgs_config.errors import ConfigurationError
@@ -17,14 +21,26 @@ from msgs_config.terrain.heights import Heights
 FELT = "felt"
 
 
+class Terrain:
+    """Shapes that do not move, and how high they are."""
+
+    def __init__(self, shapes: Sequence[Shape]) -> None:
+        """Take a terrain's shapes. Raises CharacterError if a mesh cannot be used."""
+        self.shapes, self._heights = shapes, Heights(shapes)
+
+    def height_at(self, place: FloatArray) -> float:
+        """The height in m of the highest surface at a place (3,) in m; 0 where is none."""
+        return float(np.nan_to_num(self._heights.at(place[np.newaxis, :2]))[0])
+
+
 class GroundSettings(Settings):
     """The ground that references and planners know."""
 
     terrain: str = parameter(
         PLANE,
-        "what planner predictive and a steered reference take for the ground: plane; the path of "
-        "sim_node's terrain, which `run` hands over to this planner; or felt: a plane as high as "
-        "the feet that stand, whatever there is",
+        "what planner predictive, reactions to hits and a steered reference take for the ground: "
+        "plane; the path of sim_node's terrain, which `run` hands over to the former two; or, but "
+        "for reactions, felt: a plane as high as the feet that stand, whatever there is",
     )
 
 

@@ -220,7 +220,8 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
 
     A parameter that is not among the simulator's is taken as one that goes with them.
     """
-    check_terrain(BehaviourSettings.of(values).behaviour, simulator.get("terrain"))
+    behaviour, known = BehaviourSettings.of(values).behaviour, GroundSettings.of(values).terrain
+    check_terrain(behaviour, known, simulator.get("terrain"))
     planner_settings.check_world(values, simulator)
 
 

@@ -12,6 +12,7 @@ from controller_node.behaviours.factory import (
     make_motion,
 )
 from controller_node.behaviours.onnx_policy.factory import ONNX, policy_path
+from controller_node.behaviours.settings import REACTIONS
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.ground import TERRAIN
 from controller_node.model_check import check_agreement
@@ -240,9 +241,10 @@ def with_shared(
 
 
 def _show_terrain(simulator: Mapping[str, object], controller: dict[str, object]) -> None:
-    """A planner that looks ahead knows the terrain, unless it is told what to take for it."""
+    """Who looks ahead, or tells hits, knows the terrain, unless told what to take for it."""
     terrain = simulator.get(TERRAIN.name, PLANE)
-    if controller.get("planner") == PREDICTIVE and terrain not in (PLANE, NO_GROUND):
+    knows = controller.get("planner") == PREDICTIVE or controller.get("behaviour") in REACTIONS
+    if knows and terrain not in (PLANE, NO_GROUND):
         controller.setdefault(TERRAIN.name, terrain)
 
 

@@ -7,14 +7,17 @@ from controller_node.behaviours.onnx_policy import factory as onnx_policy  # noq
 from controller_node.behaviours.pursuit import PursuitSettings
 from controller_node.behaviours.settings import REACTIONS, ReactionSettings
 from controller_node.behaviours.state_machine import factory as state_machine
+from controller_node.behaviours.state_machine.factory import STATE_MACHINE
 from controller_node.ground import GroundSettings, on_ground
 from controller_node.planner.settings import NO_PLANNER, POLICY, RECORDED, PlannerParameters
 from controller_node.references import factory
 from controller_node.references.base import Motion
+from controller_node.references.steering.reference import SteeredReference
 from msgs_config.character.model import Character
 from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
 from msgs_config.settings import Settings, parameter
+from msgs_config.shared_parameters import PLANE
 
 
 class BehaviourSettings(Settings):
@@ -39,10 +42,18 @@ def make_motion(character: Character, values: Values) -> Motion:
         ActuatedCharactersError: a file or a name does not exist, or does not fit the character.
     """
     motion = factory.make_motion(character, values)
-    motion = on_ground(motion, character, GroundSettings.of(values).terrain)
-    if BehaviourSettings.of(values).behaviour != state_machine.STATE_MACHINE:
-        return motion
-    return state_machine.limited(motion, values)
+    terrain, behaviour = GroundSettings.of(values).terrain, BehaviourSettings.of(values).behaviour
+    if (
+        behaviour in REACTIONS
+        and terrain != PLANE
+        and isinstance(motion.reference, SteeredReference)
+    ):
+        raise ConfigurationError(
+            f"parameter 'behaviour' is {behaviour}, which carries a reference to where it gets up; "
+            f"one that is steered over 'terrain' {terrain} cannot be carried"
+        )
+    motion = on_ground(motion, character, terrain)
+    return state_machine.limited(motion, values) if behaviour == STATE_MACHINE else motion
 
 
 def choose_behaviour(character: Character, values: Values) -> BehaviourChoice:
@@ -79,7 +90,7 @@ def behaviour_clips(character: Character, values: Values) -> list[str]:
 def _check_planner(behaviour: str, planner: str) -> None:
     if planner == RECORDED and behaviour != "tracking":
         wanted = "the behaviour tracking"
-    elif planner == POLICY and behaviour == state_machine.STATE_MACHINE:
+    elif planner == POLICY and behaviour == STATE_MACHINE:
         wanted = "a behaviour that follows clips"
     elif planner != NO_PLANNER and behaviour == "ragdoll":
         wanted = "a behaviour that follows a motion"

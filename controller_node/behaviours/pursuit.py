@@ -112,7 +112,10 @@ class Pursuit(Reaction):
         motion = library.references[clip]
         first = motion.sample(0.0).configuration
         start = float(self._kit.posture.heading(first.orientations_xyzw[0]))
-        carry = PlanarTransform.leading(first.position[:3], start, seen.position[:3], heading)
+        carry = self._on_ground(
+            PlanarTransform.leading(first.position[:3], start, seen.position[:3], heading),
+            seen.position,
+        )
         moved = TransformedReference(self._layout, motion, carry, seen.time)
         self._target = ClipTarget.entered(clip, moved, self._desired(seen), seen.time, _ONTO)
         self._strike_until = seen.time + library.duration(clip)
@@ -134,9 +137,8 @@ class Pursuit(Reaction):
     def _is_down(self, seen: Observation) -> bool:
         """Whether the opponent lies, or is yet to stand up."""
         assert seen.opponent is not None
-        return float(seen.opponent[2]) < _STANDING_HEIGHT * float(
-            seen.now.configuration.position[2]
-        )
+        height = float(seen.opponent[2]) - self._kit.ground_at(seen.opponent)
+        return height < _STANDING_HEIGHT * float(seen.now.configuration.position[2])
 
     def _drawn(self, seen: Observation) -> PlanarTransform:
         """The move of the reference to ahead of the body, with a heading to the opponent.
@@ -158,7 +160,8 @@ class Pursuit(Reaction):
         ahead = self._pursuit.force / (stiffness * distance) if stiffness > 0.0 else 0.0
         place = seen.position[:3] + np.array((ahead * x, ahead * y, 0.0))
         start = float(posture.heading(own.orientations_xyzw[0]))
-        return PlanarTransform.leading(own.position[:3], start, place, self._heading)
+        carry = PlanarTransform.leading(own.position[:3], start, place, self._heading)
+        return self._on_ground(carry, seen.position)
 
 
 def _length(way: tuple[float, float]) -> float:

@@ -8,7 +8,7 @@ The target of the control law is continuous in position and velocity at each cha
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from controller_node.behaviours.targets import (
     Target,
 )
 from controller_node.control_laws import GainArrays
+from controller_node.ground import Terrain
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.posture import Posture
@@ -52,6 +53,11 @@ class ReactionKit:
     library: MotionLibrary | None = None  # where a behaviour searches
     get_ups: MotionLibrary | None = None  # where a behaviour finds a clip to get up by
     plans: bool = False  # a planner counts with the gains in force for as far as it looks
+    terrain: Terrain | None = None  # that there is instead of the plane z = 0
+
+    def ground_at(self, place: FloatArray) -> float:
+        """The height in m of the ground at a place (3,) in m; 0 where is none."""
+        return 0.0 if self.terrain is None else self.terrain.height_at(place)
 
 
 _Step = Callable[[Observation, Hit | None], None]
@@ -64,7 +70,8 @@ class Reaction:
         self._kit = kit
         self._layout = kit.character.layout
         self._settings = kit.settings
-        self._detector = HitDetector(kit.character, kit.period)
+        shapes = () if kit.terrain is None else kit.terrain.shapes
+        self._detector = HitDetector(kit.character, kit.period, terrain=shapes)
         self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
         self._target: Target = self._own
@@ -177,7 +184,7 @@ class Reaction:
         library = self._kit.library
         assert library is not None
         self._detector.reset()  # forget the hit that was reacted to
-        match = library.nearest(library.predicted(self._led(seen), seen.velocity))
+        match = library.nearest(library.predicted(self._above(self._led(seen)), seen.velocity))
         self._follow_clip(library, match, seen, _ONTO * self._settings.blend_duration)
         facts = {"to": "clip", "assistance": seen.assistance(), **match.content()}
         self._begin(seen.time, Mode.BLEND, self._blend, self._phase_gains.firmer, **facts)
@@ -208,7 +215,7 @@ class Reaction:
             self._come_back(seen, self._carry_to(seen, self._body), duration)
         else:
             clip = self._settings.face_up if self._faces_up() else self._settings.face_down
-            still = library.predicted(seen.position, np.zeros_like(seen.velocity))
+            still = library.predicted(self._above(seen.position), np.zeros_like(seen.velocity))
             match = library.nearest(still, among=clip)
             self._follow_clip(library, match, seen, duration)
             self._rise_until = seen.time + library.duration(clip) - match.time
@@ -279,7 +286,9 @@ class Reaction:
         """Go over to a moment of a clip, carried to where the character is."""
         motion = library.references[match.clip]
         place = motion.sample(match.time).configuration.position
-        carry = PlanarTransform.leading(place, 0.0, self._led(seen), match.turn)
+        carry = self._on_ground(
+            PlanarTransform.leading(place, 0.0, self._led(seen), match.turn), seen.position
+        )
         moved = TransformedReference(self._layout, motion, carry, seen.time, match.time)
         before = self._desired(seen)
         self._target = ClipTarget.entered(match.clip, moved, before, seen.time, duration)
@@ -309,11 +318,22 @@ class Reaction:
 
     def _carry_to(self, seen: Observation, there: ReferenceState) -> PlanarTransform:
         """The move from the root of the reference to that of a state."""
-        return self._kit.posture.carry(seen.now.configuration, there.configuration)
+        carry = self._kit.posture.carry(seen.now.configuration, there.configuration)
+        return self._on_ground(carry, there.configuration.position)
+
+    def _on_ground(self, carry: PlanarTransform, place: FloatArray) -> PlanarTransform:
+        """A move that also lifts by the height of the ground at a place (3,)."""
+        return replace(carry, up=self._kit.ground_at(place))
+
+    def _above(self, position: FloatArray) -> FloatArray:
+        """A position (n,) as it would be over the plane z = 0."""
+        lowered = position.copy()
+        lowered[2] -= self._kit.ground_at(position)
+        return lowered
 
     def _faces_up(self) -> bool:
         return self._kit.posture.faces_up(self._body.configuration.orientations_xyzw[0])
 
     def _has_fallen(self, seen: Observation) -> bool:
-        desired = self._desired(seen).configuration
-        return self._kit.posture.has_fallen(self._body.configuration, desired)
+        body, desired = self._body.configuration, self._desired(seen).configuration
+        return self._kit.posture.has_fallen(body, desired, self._kit.ground_at(body.position))

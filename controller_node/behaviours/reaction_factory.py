@@ -9,12 +9,14 @@ from controller_node.behaviours.motion_library import MotionLibrary
 from controller_node.behaviours.pursuit import Pursuit, PursuitSettings, pursuit_settings
 from controller_node.behaviours.reaction import Reaction, ReactionKit
 from controller_node.behaviours.settings import ReactionSettings, reaction_settings
+from controller_node.ground import FELT, GroundSettings, Terrain, ground_shapes
 from controller_node.planner.settings import NO_PLANNER, PlannerParameters
 from controller_node.references.posture import Posture
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.model import Character
+from msgs_config.errors import ConfigurationError
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import SharedSettings
+from msgs_config.shared_parameters import PLANE, SharedSettings
 
 LYING_PART = 0.5
 """The part of a get-up clip in which it may begin."""
@@ -61,9 +63,21 @@ def _make_kit(character: Character, values: Values, *, searches: bool = False) -
         library=library,
         get_ups=get_ups,
         plans=PlannerParameters.of(values).planner != NO_PLANNER,
+        terrain=_terrain(GroundSettings.of(values).terrain),
     )
     rest = np.array(character.rest_position)
     for made in (library, get_ups):
         if made is not None:  # a first search takes longer than others
             made.nearest(made.predicted(rest, np.zeros_like(rest)))
     return kit
+
+
+def _terrain(named: str) -> Terrain | None:
+    """What a parameter `terrain` names; None for the plane z = 0."""
+    if named == FELT:
+        raise ConfigurationError(
+            f"controller_node's 'terrain' is {FELT}; a behaviour that reacts to hits must know the "
+            f"ground: {PLANE}, or sim_node's file"
+        )
+    shapes = ground_shapes(named)
+    return Terrain(shapes) if shapes else None

@@ -93,15 +93,18 @@ class ReactionSettings(Settings):
         return self.recovery == "clip"
 
 
-def check_terrain(behaviour: str, terrain: object) -> None:
+def check_terrain(behaviour: str, known: str, terrain: object) -> None:
     """Raise ConfigurationError if a behaviour cannot tell hits from what a ground does.
 
-    It knows the plane at z = 0 alone. `terrain` is the simulator's parameter, None if unknown.
+    `known` is the controller's parameter `terrain`; the simulator's is None if unknown.
     """
-    if behaviour in REACTIONS and terrain not in (None, PLANE, NO_GROUND):
+    if behaviour not in REACTIONS or terrain in (None, NO_GROUND):
+        return
+    if (known == PLANE) != (terrain == PLANE):
         raise ConfigurationError(
-            f"parameter 'behaviour' is {behaviour}, which tells a hit from the ground at z = 0, "
-            f"but sim_node's 'terrain' is {terrain}; it must be {PLANE} or {NO_GROUND}"
+            f"parameter 'behaviour' is {behaviour}, which tells a hit from what the ground does: "
+            f"controller_node's 'terrain' is {known}, but sim_node's is {terrain}; it must be the "
+            "same"
         )
 
 

@@ -56,9 +56,14 @@ class Posture:
         )
         return math.acos(min(max(float(fixed_order.dot(up, wanted)), -1.0), 1.0))
 
-    def has_fallen(self, body: GeneralizedPosition, target: GeneralizedPosition) -> bool:
-        """Whether the root of a body is far below a target's, or far from as upright."""
-        height, wanted = float(body.position[2]), float(target.position[2])
+    def has_fallen(
+        self, body: GeneralizedPosition, target: GeneralizedPosition, ground: float = 0.0
+    ) -> bool:
+        """Whether the root of a body is far below a target's, or far from as upright.
+
+        Both are seen from the height of the ground below the body, m.
+        """
+        height, wanted = (float(each.position[2]) - ground for each in (body, target))
         if height < _FALLEN_HEIGHT * wanted and wanted - height > self._drop:
             return True
         return self.tilt(body.orientations_xyzw[0], target.orientations_xyzw[0]) > _FALLEN_TILT

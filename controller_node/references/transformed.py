@@ -13,11 +13,12 @@ from msgs_config.geometry import rotations
 
 @dataclass(frozen=True)
 class PlanarTransform:
-    """A move of the whole character: turned about the world's z, then shifted on the ground."""
+    """A move of the whole character: turned about the world's z, then shifted."""
 
     turn: float = 0.0  # rad
     x: float = 0.0  # m
     y: float = 0.0
+    up: float = 0.0  # m, where the ground is higher
 
     @classmethod
     def leading(
@@ -46,7 +47,7 @@ class PlanarTransform:
         velocity, acceleration = state.velocity.copy(), state.acceleration.copy()
         linear = np.array((position[:3], velocity[:3], acceleration[:3]))
         position[:3], velocity[:3], acceleration[:3] = rotations.rotate(about_z, linear)
-        position[:2] += (self.x, self.y)
+        position[:3] += (self.x, self.y, self.up)
         orientations[0] = rotations.multiply(about_z, orientations[0])
         position[3:6] = rotations.log(orientations[0])
         return ReferenceState(GeneralizedPosition(position, orientations), velocity, acceleration)

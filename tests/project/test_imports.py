@@ -32,6 +32,7 @@ ENGINES = {  # who imports them; how far they are known beyond that is in pyproj
         "msgs_config/character/mujoco_model.py",
         "msgs_config/character/mujoco_world.py",
         "msgs_config/terrain/heights.py",
+        "msgs_config/terrain/surfaces.py",
         "msgs_config/compiled/data_layout.py",
         "msgs_config/compiled/mujoco_functions.py",
         *(f"sim_node/physics/mujoco/{name}.py" for name in ("balls", "body", "contacts")),

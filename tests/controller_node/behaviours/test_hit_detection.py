@@ -144,7 +144,7 @@ forces_3 = st.tuples(*[st.floats(-1e3, 1e3)] * 3).map(np.array)
 
 @given(forces_3)
 def test_beyond_the_cone_is_the_shortest_way_out_of_it(force: FloatArray) -> None:
-    rest = beyond_cone(force, FRICTION)
+    rest = beyond_cone(force, FRICTION, np.array((0.0, 0.0, 1.0)))
     nearest = force - rest
 
     # the projection on a closed convex cone (Moreau 1962): in it, at right angles to the rest,
