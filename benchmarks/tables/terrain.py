@@ -1,4 +1,4 @@
-"""Walks by the planner over terrain: stairs and slopes that it sees, and steps that it does not."""
+"""Walks over terrain: stairs and slopes that the planner sees, and steps that nobody does."""
 
 from collections.abc import Iterator
 
@@ -22,15 +22,19 @@ def terrain_cases(kind: str, options: Options) -> Iterator[Case]:
     for seed in options.seeds(24):
         rng = np.random.default_rng((seed, len(kind)))
         begin, speed = (round(float(rng.uniform(*each)), 3) for each in ((1.5, 2.5), (0.5, 0.65)))
-        ground = options.folder / f"{kind}_{seed}.{'urdf' if kind == 'blind' else 'yaml'}"
+        is_seen = kind in ("stairs", "slopes")
+        ground = options.folder / f"{kind}_{seed}.{'yaml' if is_seen else 'urdf'}"
         controller = planner(seed) | {"plan.step": 0.009}
         if kind == "slopes":  # the default foresees slips there: 15 degrees take 0.27 by themselves
             controller |= {"plan.friction": 0.45}
-        if kind == "blind":
+        if kind == "machine":
+            controller = {"behaviour": "state_machine", "machine": options.machine or "rough"}
+        if not is_seen:
             heights = np.cumsum(BLIND_STEP * rng.choice((-1.0, 1.0), BLIND_STEPS)).tolist()
             ground.write_text(steps_urdf(heights, begin))
             end, speed = begin + STEP_LENGTH * (BLIND_STEPS - 1), BLIND_SPEED
-            controller |= {"terrain": "felt"}
+            if kind == "blind":
+                controller |= {"terrain": "felt"}
         else:
             tread = round(float(rng.uniform(0.35, 0.45)), 3)
             piece: dict[str, object] = {"at": [begin, 0.0], "width": 4.0, "landing": 1.5}
@@ -44,7 +48,7 @@ def terrain_cases(kind: str, options: Options) -> Iterator[Case]:
         yield Case(
             kind,
             options.seconds or round((end + BEYOND) / speed + 1.0, 2),
-            {"reference": "steered"},
+            {} if kind == "machine" else {"reference": "steered"},
             {"terrain": str(ground)},
             controller,
             commands=f"{speed},0,0@0.5",
@@ -66,8 +70,8 @@ def measure_terrain(seen: Seen) -> dict[str, Fact]:
 TABLES = {
     "terrain": RunTable(
         f"terrain, planned: stairs of {RISE:g} m, slopes of {ANGLE:g} degrees, unseen steps of "
-        f"{BLIND_STEP:g} m",
-        ["stairs", "slopes", "blind"],
+        f"{BLIND_STEP:g} m; these by a machine as well",
+        ["stairs", "slopes", "blind", "machine"],
         terrain_cases,
         measure_terrain,
     )

@@ -4,6 +4,7 @@
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -39,13 +40,14 @@ from msgs_config.mappings import MappingReader
 
 MACHINES_DIRECTORY = Path(__file__).parent / "data"
 _KEYS = [
-    *("sides", "start", "includes", "joins", "acceleration", "limits", "gains", "bounds"),
-    "states",
+    *("sides", "start", "includes", "changes", "joins", "acceleration", "limits", "gains"),
+    *("bounds", "states"),
 ]
 _STATE_KEYS = [
     *("feet", "duration", "blend", "root", "pressure", "placement", "targets", "gains"),
     *("efforts", "tracks", "ends"),
 ]
+_CHANGEABLE = ("duration", "root", "pressure", "placement")
 _FILES = (".yaml", ".yml")
 _NEVER = "never"
 _PARTS = ("hip", "knee", "ankle")  # parts that every side has
@@ -109,16 +111,38 @@ def make_machine(path: Path, content: dict[str, Any], depth: int = _DEPTH) -> Ma
     parts = reader.part("states")
     for name in parts.content:
         states[name] = _state(name, parts.part(name), gains, bounds)
+    changes = reader.part("changes")
+    for name in changes.content:
+        state = _named(states, name, changes)
+        states[name] = _changed(state, changes.part(name))
     joins = reader.part("joins")
     for name in joins.content:
-        if name not in states:
-            raise ConfigurationError(f"{path}: joins: {one_of('state', name, list(states))}")
-        states[name] = replace(states[name], ends=_ends(joins, name) + states[name].ends)
+        state = _named(states, name, joins)
+        states[name] = replace(state, ends=_ends(joins, name) + state.ends)
     acceleration = reader.number("acceleration", 1e9, 1e-3, 1e9)
     if not states:
         raise reader.wrong("states", content.get("states"), "a mapping of one state or more")
     limits = _limits(reader.part("limits"))
     return Machine(path, sides, reader.text("start"), states, acceleration, limits)
+
+
+def _named(states: Mapping[str, State], name: str, reader: MappingReader) -> State:
+    if name not in states:
+        wrong = one_of("state", name, list(states))
+        raise ConfigurationError(f"{reader.place}: {reader.prefix[:-1]}: {wrong}")
+    return states[name]
+
+
+def _changed(state: State, reader: MappingReader) -> State:
+    """A state with other numbers of how it stands and steps."""
+    reader.check_keys(_CHANGEABLE)
+    return replace(
+        state,
+        duration=reader.number("duration", state.duration, 1e-3, 1e6),
+        root=_values(reader.part("root"), state.root),
+        pressure=_values(reader.part("pressure"), state.pressure),
+        placement=_placement(reader.part("placement"), state.placement),
+    )
 
 
 def _limits(reader: MappingReader) -> VelocityRegion:
@@ -179,7 +203,7 @@ def _state(name: str, reader: MappingReader, gains: dict[str, Gains], bounds: Bo
         blend=reader.number("blend", 0.0, 0.0, 1e6),
         root=_values(root, RootTarget(height)),
         pressure=_values(reader.part("pressure"), PressureTarget()),
-        placement=_placement(reader.part("placement")),
+        placement=_placement(reader.part("placement"), FootPlacement()),
         targets=_targets(reader.part("targets")),
         gains={**gains, **_gains(reader.part("gains"))},
         efforts=_efforts(reader.part("efforts")),
@@ -205,8 +229,8 @@ def _values(reader: MappingReader, default: Any) -> Any:
     return type(default)(**changed)
 
 
-def _placement(reader: MappingReader) -> FootPlacement:
-    placement: FootPlacement = _values(reader, FootPlacement())
+def _placement(reader: MappingReader, default: FootPlacement) -> FootPlacement:
+    placement: FootPlacement = _values(reader, default)
     if placement.law not in PLACEMENT_LAWS:
         raise reader.wrong("law", placement.law, " or ".join(f"'{law}'" for law in PLACEMENT_LAWS))
     if placement.origin not in (HIP, CENTRE):

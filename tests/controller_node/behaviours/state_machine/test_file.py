@@ -1,6 +1,7 @@
 """What is wrong in a machine's file is one line before anything starts."""
 
 from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +124,9 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
         ({"states__one__feet__swing": "reach"}, "a foot that reaches needs 'placement.length'"),
         ({"states__one__placement": {"law": "guess"}}, "placement.law is 'guess'; it must be"),
         ({"states__one__placement": {"origin": "toe"}}, "placement.origin is 'toe'; it must be"),
+        ({"changes": {"bth": {}}}, "changes: unknown state 'bth'; did you mean 'both'?"),
+        ({"changes": {"both": {"ends": []}}}, "unknown key 'changes.both.ends'; there are: "),
+        ({"changes": {"one": {"placement": {"law": "guess"}}}}, "changes.one.placement.law is 'gu"),
         ({"joins": {"bth": []}}, "joins: unknown state 'bth'; did you mean 'both'?"),
         ({"joins": {"both": []}}, "joins.both is a list; it must be a list of one end or more"),
         ({"states__one__placement": {"wdith": 0.2}}, "unknown key 'states.one.placement.wdith'"),
@@ -178,6 +182,15 @@ def test_states_of_an_included_machine_have_its_prefix(tmp_path: Path) -> None:
 
     assert {"both", "one", "walk.stand", "walk.step"} <= set(states)
     assert all(end.then in states for state in states.values() for end in state.ends)
+
+
+def test_what_changes_of_an_included_state_is_what_is_said() -> None:
+    walk, rough = read_machine("walk").states["step"], read_machine("rough").states["walk.step"]
+
+    assert (rough.placement.clearance, rough.placement.descent) == (0.16, 1.0)
+    kept = replace(rough.placement, clearance=0.1, descent=0.5)
+    assert (kept, rough.root, rough.pressure) == (walk.placement, walk.root, walk.pressure)
+    assert (rough.duration, rough.targets) == (walk.duration, walk.targets)
 
 
 def test_a_join_ends_an_included_state_before_its_own_ends(tmp_path: Path) -> None:
