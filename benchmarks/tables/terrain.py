@@ -14,6 +14,7 @@ from benchmarks.tables.seen import Seen
 RISE, STEPS, ANGLE = 0.15, 4, 15.0  # m, of stairs; degrees, of slopes
 BLIND_STEP, BLIND_STEPS = 0.05, 5  # m up or down, every 0.8 m
 BLIND_SPEED = 0.5  # m/s
+MACHINE_PACE = 0.8  # of the commanded speed, at least, over steps
 BEYOND = 0.8  # m that it goes on for
 
 
@@ -45,9 +46,10 @@ def terrain_cases(kind: str, options: Options) -> Iterator[Case]:
             )
             ground.write_text(yaml.safe_dump({kind: [{**piece, "down": True}]}))
             end = begin + (2 * STEPS * tread + 1.5 - tread if kind == "stairs" else 6.5)
+        pace = MACHINE_PACE * speed if kind == "machine" else speed
         yield Case(
             kind,
-            options.seconds or round((end + BEYOND) / speed + 1.0, 2),
+            options.seconds or round((end + BEYOND) / pace + 1.0, 2),
             {} if kind == "machine" else {"reference": "steered"},
             {"terrain": str(ground)},
             controller,
