@@ -17,20 +17,21 @@ from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import PLANE
 from msgs_config.terrain.file import read_terrain
 from msgs_config.terrain.heights import Heights
+from msgs_config.terrain.surfaces import Surfaces
 
 FELT = "felt"
 
 
 class Terrain:
-    """Shapes that do not move, and how high they are."""
+    """The ground below a character, and the surfaces that its links reach."""
 
-    def __init__(self, shapes: Sequence[Shape]) -> None:
+    def __init__(self, character: Character, shapes: Sequence[Shape]) -> None:
         """Take a terrain's shapes. Raises CharacterError if a mesh cannot be used."""
-        self.shapes, self._heights = shapes, Heights(shapes)
+        self.surfaces, self._heights = Surfaces(character, shapes), Heights(shapes)
 
-    def height_at(self, place: FloatArray) -> float:
-        """The height in m of the highest surface at a place (3,) in m; 0 where is none."""
-        return float(np.nan_to_num(self._heights.at(place[np.newaxis, :2]))[0])
+    def height_below(self, place: FloatArray) -> float:
+        """The height in m of the highest surface below a place (3,) in m; 0 where is none."""
+        return float(np.nan_to_num(self._heights.below(place[np.newaxis]))[0])
 
 
 class GroundSettings(Settings):
@@ -67,10 +68,19 @@ def terrain_path(terrain: str) -> Path:
     path = files.resolve(terrain, Path.cwd(), ConfigurationError)
     if not path.is_file():
         raise ConfigurationError(
-            f"controller_node's '{TERRAIN.name}' is {terrain}; it must be {PLANE}, {FELT} or the "
-            f"path of a file, and there is no {path}"
+            f"parameter '{TERRAIN.name}' is {terrain}; it must be {PLANE}, for planners {FELT}, or "
+            f"the path of a file, and there is no {path}"
         )
     return path
+
+
+def check_placement(character: Character) -> None:
+    """Raise ConfigurationError if a character's own world is not where the terrain's is."""
+    if character.placement != Placement():
+        raise ConfigurationError(
+            f"parameter 'placement' is not 0; a controller that knows '{TERRAIN.name}' has the "
+            "character's own world where the terrain's is"
+        )
 
 
 def on_ground(motion: Motion, character: Character, terrain: str) -> Motion:
@@ -81,11 +91,8 @@ def on_ground(motion: Motion, character: Character, terrain: str) -> Motion:
         ConfigurationError: the character's own world is not where the terrain's is.
     """
     shapes, steered = ground_shapes(terrain), motion.reference
-    if shapes and character.placement != Placement():
-        raise ConfigurationError(
-            f"parameter 'placement' is not 0; a controller that knows '{TERRAIN.name}' has the "
-            "character's own world where the terrain's is"
-        )
     if terrain == PLANE or not isinstance(steered, SteeredReference):
         return motion
+    if shapes:
+        check_placement(character)
     return replace(motion, reference=steered.over(Heights(shapes) if shapes else None))

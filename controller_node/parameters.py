@@ -220,9 +220,9 @@ def check_world(values: Values, simulator: Mapping[str, object]) -> None:
 
     A parameter that is not among the simulator's is taken as one that goes with them.
     """
+    planner_settings.check_world(values, simulator)
     behaviour, known = BehaviourSettings.of(values).behaviour, GroundSettings.of(values).terrain
     check_terrain(behaviour, known, simulator.get("terrain"))
-    planner_settings.check_world(values, simulator)
 
 
 def commanded_joints(character: Character, values: Values) -> list[str]:

@@ -243,8 +243,9 @@ def with_shared(
 def _show_terrain(simulator: Mapping[str, object], controller: dict[str, object]) -> None:
     """Who looks ahead, or tells hits, knows the terrain, unless told what to take for it."""
     terrain = simulator.get(TERRAIN.name, PLANE)
-    knows = controller.get("planner") == PREDICTIVE or controller.get("behaviour") in REACTIONS
-    if knows and terrain not in (PLANE, NO_GROUND):
+    planner = controller.get("planner", NO_PLANNER)
+    reacts = controller.get("behaviour") in REACTIONS and planner == NO_PLANNER
+    if (reacts or planner == PREDICTIVE) and terrain not in (PLANE, NO_GROUND):
         controller.setdefault(TERRAIN.name, terrain)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from controller_node.behaviours.bounding_spheres import BoundingSpheres
 from msgs_config.arrays import FloatArray, IntArray
-from msgs_config.character.model import Character, Shape
+from msgs_config.character.model import Character
 from msgs_config.geometry import fixed_order
 from msgs_config.terrain.surfaces import MARGIN, Surfaces
 
@@ -43,14 +43,14 @@ class HitDetector:
         character: Character,
         period: float,
         window: float = WINDOW,
-        terrain: Sequence[Shape] = (),
+        terrain: Surfaces | None = None,
     ) -> None:
         """For ticks of `period`; impulses are added up over `window`; s.
 
-        Without the shapes of a terrain the ground is the plane z = 0.
+        Without the surfaces of a terrain the ground is the plane z = 0.
         """
         self._spheres = BoundingSpheres(character)
-        self._terrain = Surfaces(character, terrain) if terrain else None
+        self._terrain = terrain
         self._period = period
         self._recent: deque[FloatArray] = deque(maxlen=max(round(window / period), 1))
         self._before: tuple[FloatArray, FloatArray] | None = None  # the links' frames
@@ -91,8 +91,8 @@ class HitDetector:
         for group in groups:
             links = touched[group]
             rest = fixed_order.total(forces[links], axis=0)
-            ways = np.unique(np.concatenate([normals[link] for link in links.tolist()]), axis=0)
-            rest = _beyond_cones(rest, ways)
+            reached = np.concatenate([normals[link] for link in links.tolist()])
+            rest = _beyond_cones(rest, np.unique(reached, axis=0))
             struck = links[int(np.argmax(fixed_order.dot(forces[links], rest)))]
             unexplained[struck] = rest
         return unexplained

@@ -113,8 +113,7 @@ class Pursuit(Reaction):
         first = motion.sample(0.0).configuration
         start = float(self._kit.posture.heading(first.orientations_xyzw[0]))
         carry = self._on_ground(
-            PlanarTransform.leading(first.position[:3], start, seen.position[:3], heading),
-            seen.position,
+            PlanarTransform.leading(first.position[:3], start, seen.position[:3], heading)
         )
         moved = TransformedReference(self._layout, motion, carry, seen.time)
         self._target = ClipTarget.entered(clip, moved, self._desired(seen), seen.time, _ONTO)
@@ -137,7 +136,7 @@ class Pursuit(Reaction):
     def _is_down(self, seen: Observation) -> bool:
         """Whether the opponent lies, or is yet to stand up."""
         assert seen.opponent is not None
-        height = float(seen.opponent[2]) - self._kit.ground_at(seen.opponent)
+        height = float(seen.opponent[2]) - self._kit.ground_below(seen.opponent)
         return height < _STANDING_HEIGHT * float(seen.now.configuration.position[2])
 
     def _drawn(self, seen: Observation) -> PlanarTransform:
@@ -161,7 +160,7 @@ class Pursuit(Reaction):
         place = seen.position[:3] + np.array((ahead * x, ahead * y, 0.0))
         start = float(posture.heading(own.orientations_xyzw[0]))
         carry = PlanarTransform.leading(own.position[:3], start, place, self._heading)
-        return self._on_ground(carry, seen.position)
+        return self._on_ground(carry)
 
 
 def _length(way: tuple[float, float]) -> float:

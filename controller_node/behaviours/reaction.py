@@ -7,6 +7,7 @@ Source: Zordan, Majkowska, Chiu and Fast 2005, "Dynamic Response for Motion Capt
 The target of the control law is continuous in position and velocity at each change.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,7 @@ from controller_node.ground import Terrain
 from controller_node.references.base import ReferenceState
 from controller_node.references.inertialised import InertializationOffset
 from controller_node.references.posture import Posture
+from controller_node.references.steering.velocity import within
 from controller_node.references.transformed import PlanarTransform, TransformedReference
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel
@@ -39,6 +41,7 @@ _SEVERE = 2.0 / 3.0  # share of `limp.threshold`: from there on a hit has the fu
 _ONTO = 0.6  # share of the blend's duration until the motion that was found is reached
 _STILL_SPEED = 0.1  # m/s: it lies still with less kinetic energy than all of it at that speed
 _STILL_TIME, _LONGEST_LIMP = 0.4, 5.0  # s
+_CLIMB = 0.5  # m/s, at most, by which references follow the height of the ground
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,9 @@ class ReactionKit:
     plans: bool = False  # a planner counts with the gains in force for as far as it looks
     terrain: Terrain | None = None  # that there is instead of the plane z = 0
 
-    def ground_at(self, place: FloatArray) -> float:
-        """The height in m of the ground at a place (3,) in m; 0 where is none."""
-        return 0.0 if self.terrain is None else self.terrain.height_at(place)
+    def ground_below(self, place: FloatArray) -> float:
+        """The height in m of the ground below a place (3,) in m; 0 where is none."""
+        return 0.0 if self.terrain is None else self.terrain.height_below(place)
 
 
 _Step = Callable[[Observation, Hit | None], None]
@@ -70,8 +73,9 @@ class Reaction:
         self._kit = kit
         self._layout = kit.character.layout
         self._settings = kit.settings
-        shapes = () if kit.terrain is None else kit.terrain.shapes
-        self._detector = HitDetector(kit.character, kit.period, terrain=shapes)
+        surfaces = None if kit.terrain is None else kit.terrain.surfaces
+        self._detector = HitDetector(kit.character, kit.period, terrain=surfaces)
+        self._up = 0.0  # m that the target is lifted, as the ground is
         self._phase_gains = ReactionGains(kit.character, kit.settings, kit.model.weight, kit.plans)
         self._own = ReferenceTarget(self._layout)
         self._target: Target = self._own
@@ -94,9 +98,19 @@ class Reaction:
         hit = self._detector.strongest(seen.contacts, *self._kit.model.link_poses())
         still = np.zeros(self._layout.size)
         self._body = ReferenceState(self._layout.configuration(seen.position), seen.velocity, still)
+        self._follow_ground(seen.position[:3])
         if not self._gets_up_now(seen):
             self._step(seen, hit)
         return BehaviourOutput(self._phase, self._target, self._gains(seen, self._elapsed(seen)))
+
+    def _follow_ground(self, place: FloatArray) -> None:
+        """Lift the own reference by the height of the ground below the body, not all at once."""
+        if self._kit.terrain is None:
+            return
+        is_tracked = not isinstance(self._target, CurrentStateTarget)
+        most = _CLIMB * self._kit.period if is_tracked else math.inf
+        self._up += within(self._kit.ground_below(place) - self._up, most)
+        self.carry = self._on_ground(self.carry)
 
     def _gets_up_now(self, seen: Observation) -> bool:
         """Begin to get up where that was asked for in this tick, and it lies."""
@@ -286,9 +300,7 @@ class Reaction:
         """Go over to a moment of a clip, carried to where the character is."""
         motion = library.references[match.clip]
         place = motion.sample(match.time).configuration.position
-        carry = self._on_ground(
-            PlanarTransform.leading(place, 0.0, self._led(seen), match.turn), seen.position
-        )
+        carry = self._on_ground(PlanarTransform.leading(place, 0.0, self._led(seen), match.turn))
         moved = TransformedReference(self._layout, motion, carry, seen.time, match.time)
         before = self._desired(seen)
         self._target = ClipTarget.entered(match.clip, moved, before, seen.time, duration)
@@ -319,16 +331,16 @@ class Reaction:
     def _carry_to(self, seen: Observation, there: ReferenceState) -> PlanarTransform:
         """The move from the root of the reference to that of a state."""
         carry = self._kit.posture.carry(seen.now.configuration, there.configuration)
-        return self._on_ground(carry, there.configuration.position)
+        return self._on_ground(carry)
 
-    def _on_ground(self, carry: PlanarTransform, place: FloatArray) -> PlanarTransform:
-        """A move that also lifts by the height of the ground at a place (3,)."""
-        return replace(carry, up=self._kit.ground_at(place))
+    def _on_ground(self, carry: PlanarTransform) -> PlanarTransform:
+        """A move that also lifts."""
+        return replace(carry, up=self._up)
 
     def _above(self, position: FloatArray) -> FloatArray:
         """A position (n,) as it would be over the plane z = 0."""
         lowered = position.copy()
-        lowered[2] -= self._kit.ground_at(position)
+        lowered[2] -= self._up
         return lowered
 
     def _faces_up(self) -> bool:
@@ -336,4 +348,4 @@ class Reaction:
 
     def _has_fallen(self, seen: Observation) -> bool:
         body, desired = self._body.configuration, self._desired(seen).configuration
-        return self._kit.posture.has_fallen(body, desired, self._kit.ground_at(body.position))
+        return self._kit.posture.has_fallen(body, desired, self._up)

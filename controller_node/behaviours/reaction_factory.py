@@ -63,7 +63,7 @@ def _make_kit(character: Character, values: Values, *, searches: bool = False) -
         library=library,
         get_ups=get_ups,
         plans=PlannerParameters.of(values).planner != NO_PLANNER,
-        terrain=_terrain(GroundSettings.of(values).terrain),
+        terrain=_terrain(character, GroundSettings.of(values).terrain),
     )
     rest = np.array(character.rest_position)
     for made in (library, get_ups):
@@ -72,12 +72,17 @@ def _make_kit(character: Character, values: Values, *, searches: bool = False) -
     return kit
 
 
-def _terrain(named: str) -> Terrain | None:
+def _terrain(character: Character, named: str) -> Terrain | None:
     """What a parameter `terrain` names; None for the plane z = 0."""
     if named == FELT:
         raise ConfigurationError(
             f"controller_node's 'terrain' is {FELT}; a behaviour that reacts to hits must know the "
             f"ground: {PLANE}, or sim_node's file"
         )
+    if named != PLANE and character.placement.z != 0.0:
+        raise ConfigurationError(
+            "parameter 'placement' is not at z = 0, from where a behaviour that reacts to hits "
+            "sees the heights of a 'terrain'"
+        )
     shapes = ground_shapes(named)
-    return Terrain(shapes) if shapes else None
+    return Terrain(character, shapes) if shapes else None

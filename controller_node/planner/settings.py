@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller_node.ground import FELT, TERRAIN
+from controller_node.ground import FELT, TERRAIN, check_placement
 from msgs_config.arrays import FloatArray
 from msgs_config.character.layout import JointType
 from msgs_config.character.model import Character
@@ -163,6 +163,8 @@ def check_ground(character: Character, given: PlannerParameters) -> None:
             f"controller_node's '{TERRAIN.name}' is {given.terrain}, and planner '{given.planner}' "
             f"knows the ground at z = 0 alone; it must be {PLANE}"
         )
+    if given.terrain not in (PLANE, FELT):
+        check_placement(character)
     wrong = {
         f"'{character.name}' has no feet in its file": not character.feet,
         f"'{COMMAND_DELAY.name}' is {given.delay}; it must be 0": given.delay > 0,

@@ -30,10 +30,13 @@ class Heights:
 
     def at(self, places: FloatArray) -> FloatArray:
         """The height z (r,) in m of the highest surface at places (r, 2) in m; NaN without one."""
-        heights = np.full(len(places), np.nan)
-        for row, (x, y) in enumerate(places.tolist()):
-            above = np.array((x, y, _ABOVE))
-            way = mujoco.mj_ray(self._model, self._data, above, _DOWN, None, True, -1, None)
+        return self.below(np.column_stack((places, np.full(len(places), _ABOVE))))
+
+    def below(self, points: FloatArray) -> FloatArray:
+        """The height z (r,) in m of the highest surface below points (r, 3) in m; NaN without."""
+        heights = np.full(len(points), np.nan)
+        for row, point in enumerate(points):
+            way = mujoco.mj_ray(self._model, self._data, point, _DOWN, None, True, -1, None)
             if way >= 0.0:
-                heights[row] = _ABOVE - way
+                heights[row] = point[2] - way
         return heights

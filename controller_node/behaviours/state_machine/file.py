@@ -136,10 +136,12 @@ def _named(states: Mapping[str, State], name: str, reader: MappingReader) -> Sta
 def _changed(state: State, reader: MappingReader) -> State:
     """A state with other numbers of how it stands and steps."""
     reader.check_keys(_CHANGEABLE)
+    root = reader.part("root")
+    height = root.number("height", state.root.height, 0.0, 1e3)
     return replace(
         state,
         duration=reader.number("duration", state.duration, 1e-3, 1e6),
-        root=_values(reader.part("root"), state.root),
+        root=_values(root, replace(state.root, height=height)),
         pressure=_values(reader.part("pressure"), state.pressure),
         placement=_placement(reader.part("placement"), state.placement),
     )

@@ -19,7 +19,7 @@ from msgs_config.geometry import rotations
 _STANDING = 0.35  # share of the mean speed over the ground, below which a foot stands
 _STRAY = 0.1  # share of a cycle in which a foot may do otherwise than once a cycle
 _LIFT, _MOST_LIFT = 0.25, 0.04  # of a rise, and m: how far a foot is lifted over an edge
-_HIGH, _SOONER = 0.1, 0.3  # m of an edge down, and share of a swing: so much sooner it is ahead
+_DROP, _SOONER = 0.1, 0.3  # m of an edge down, and share of a swing: so much sooner it is ahead
 _NEAR, _FACING = 0.01, 0.05  # m and rad from where it stands at ease, at which a foot is there
 
 
@@ -139,8 +139,9 @@ def swung_on(foot: Footprint, target: Footprint, was: float, now: float) -> Foot
         now: How much is; 0 once it has come down.
     """
     along, edge = _rise(foot, target)
-    drop = -edge / (1.0 - eased(was)) if was < 1.0 else 0.0
-    in_time = 1.0 - _SOONER * min(max(drop, 0.0) / _HIGH, 1.0)
+    rest = 1.0 - eased(was)
+    drop = -edge / rest if rest > 0.0 else 0.0
+    in_time = 1.0 - _SOONER * min(max(drop, 0.0) / _DROP, 1.0)
     share = _swing_share(min(was / in_time, 1.0), min(now / in_time, 1.0))
     height = foot.height + share * along + _swing_share(was, now) * edge
     return replace(foot.towards(target, share), height=height)

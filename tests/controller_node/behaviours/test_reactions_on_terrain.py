@@ -2,25 +2,30 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuated_characters.runs.bare_loop import ticks_in_process
-from actuated_characters.runs.plan import RunPlan, make_plan
+from actuated_characters.runs.plan import make_plan
 from actuated_characters.runs.planned.wrenches import plan_push
-from controller_node.behaviours.base import Mode
+from controller_node.behaviours.base import Mode, Phase
+from controller_node.behaviours.factory import choose_behaviour
 from controller_node.behaviours.hit_detection import HitDetector
+from controller_node.ground import Terrain
 from controller_node.parameters import check_world, make_controller, resolve_for
 from controller_node.references.clip import ClipReference
+from controller_node.references.posture import Posture
 from controller_node.references.transformed import PlanarTransform
 from msgs_config.arrays import FloatArray
 from msgs_config.character.dynamics import DynamicsModel, still_model
 from msgs_config.character.lowest_points import lowest_heights
-from msgs_config.character.model import Pose, Shape, ShapeType
+from msgs_config.character.model import Placement, Pose, Shape, ShapeType
 from msgs_config.clips.reading import read_clip
 from msgs_config.errors import ConfigurationError
+from msgs_config.terrain.surfaces import Surfaces
 from tests.support.physics import character
 
 HUMANOID = character("humanoid")
@@ -29,6 +34,11 @@ STANDING = np.array(HUMANOID.rest_position)
 PERIOD = 1.0 / 240.0  # s
 FLOOR = Shape(ShapeType.BOX, (9.0, 9.0, 1.0), Pose((0.0, 0.0, -0.5)))
 PLATE = 0.15  # m, higher than the ground beside the way
+DEPTH = -0.8  # m, of the ground beside another way
+PIT = """
+ground: none
+boxes: [{at: [5, -1.6, -1.0], size: [16, 4, 1]}, {at: [5, 4.4, -1.8], size: [16, 8, 1]}]
+"""
 BESIDE = f"boxes: [{{at: [5, 1.75], size: [14, 3, {PLATE}]}}]"
 
 
@@ -54,7 +64,8 @@ def impulse(
     contacts = np.zeros((len(LINKS), 6))
     for name, force in forces.items():
         contacts[LINKS.index(name), :3] = force
-    detector = HitDetector(HUMANOID, PERIOD, terrain=terrain)
+    surfaces = Surfaces(HUMANOID, terrain) if terrain else None
+    detector = HitDetector(HUMANOID, PERIOD, terrain=surfaces)
     hit = detector.strongest(contacts, *model.link_poses())
     return 0.0 if hit is None else hit.impulse
 
@@ -116,35 +127,80 @@ def beside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def falls(terrain: Path) -> RunPlan:
-    simulator, controller = {"terrain": str(terrain)}, {"behaviour": "active_ragdoll"}
-    return make_plan("humanoid", 9.0, {"clip": "walk"}, simulator, controller)
+@dataclass
+class Walked:
+    """What became of a walk."""
+
+    modes: list[Phase]
+    root: FloatArray  # (t, 3) m
 
 
-def test_who_falls_onto_a_plate_gets_up_on_it_and_walks_on(beside: Path) -> None:
-    # Arrange
-    plan = falls(beside)
+def walk(terrain: Path, force: float) -> Walked:
+    """An active ragdoll walks for 9 s, pushed to the left after one, by a force in N."""
+    simulator, given = {"terrain": str(terrain)}, {"behaviour": "active_ragdoll"}
+    plan = make_plan("humanoid", 9.0, {"clip": "walk"}, simulator, given)
+    assert plan.controller["terrain"] == str(terrain)
     controller = make_controller(plan.character, plan.reference, plan.controller)
-    push = plan_push(plan, "chest", (0.0, 1000.0, 0.0), 1.0)
-    modes, roots = [], []
-
-    # Act
+    push = plan_push(plan, "chest", (0.0, force, 0.0), 1.0)
+    modes, root = list[Phase](), list[FloatArray]()
     for tick in ticks_in_process(plan, [push], controller=controller):
         assert controller.mode is not None
         if not modes or controller.mode.phase is not modes[-1]:
             modes.append(controller.mode.phase)
-        roots.append(tick.following.position[:3])
-
-    # Assert
-    root = np.array(roots)
-    assert plan.controller["terrain"] == str(beside)
-    names = [phase.mode for phase in modes]
-    assert Mode.LIMP in names
-    assert names[-1] is Mode.TRACK
+        root.append(tick.following.position[:3])
     assert all(phase.facts.get("why") != "hit" for phase in modes)  # a push touches nothing
-    assert PLATE < root[:, 2].min() < PLATE + 0.2  # it lay on the plate
-    assert root[-1, 1] > 0.3
-    assert root[-60:, 2].min() > PLATE + 0.7
+    return Walked(modes, np.array(root))
+
+
+def test_who_is_pushed_onto_a_plate_walks_on_there(beside: Path) -> None:
+    walked = walk(beside, 1000.0)
+
+    assert [phase.mode for phase in walked.modes] == [Mode.TRACK]
+    assert walked.root[-1, 1] > 1.0
+    assert walked.root[-240:, 2].min() > PLATE + 0.75
+
+
+def test_who_falls_onto_a_plate_gets_up_there_and_walks_off_it(beside: Path) -> None:
+    walked = walk(beside, 2500.0)
+
+    modes = [phase.mode for phase in walked.modes]
+    assert Mode.LIMP in modes
+    assert modes[-1] is Mode.TRACK
+    assert PLATE < walked.root[:, 2].min() < PLATE + 0.2  # it lay there
+    assert walked.root[:, 2].max() > PLATE + 0.85  # and stood
+    assert walked.root[-1, 1] < 0.0
+    assert 0.75 < walked.root[-1, 2] < 0.9
+
+
+def test_who_falls_into_a_pit_gets_up_by_the_clip_that_is_near(tmp_path: Path) -> None:
+    terrain = tmp_path / "pit.yaml"
+    terrain.write_text(PIT)
+
+    walked = walk(terrain, 1000.0)
+
+    (found,) = (phase for phase in walked.modes if "distance" in phase.facts)
+    assert float(str(found.facts["distance"])) < 1.0
+    assert walked.modes[-1].mode is Mode.TRACK
+    assert walked.root[-120:, 2].min() > DEPTH + 0.75
+
+
+def test_a_roof_is_no_ground_to_who_is_below_it() -> None:
+    roof = Shape(ShapeType.BOX, (9.0, 9.0, 0.1), Pose((0.0, 0.0, 2.5)))
+    terrain = Terrain(HUMANOID, [FLOOR, roof])
+
+    assert terrain.height_below(np.array((0.0, 0.0, 0.9))) == pytest.approx(0.0, abs=1e-9)
+    assert terrain.height_below(np.array((0.0, 0.0, 3.0))) == pytest.approx(2.55)
+    assert terrain.height_below(np.array((99.0, 0.0, 3.0))) == 0.0  # where is none
+
+
+def test_a_fall_is_seen_from_the_ground() -> None:
+    posture, layout = Posture(HUMANOID), HUMANOID.layout
+    low, high = STANDING.copy(), STANDING.copy()
+    low[2], high[2] = 2.3, 2.85
+    body, target = layout.configuration(low), layout.configuration(high)
+
+    assert posture.has_fallen(body, target, ground=2.0)
+    assert not posture.has_fallen(body, target)
 
 
 @pytest.mark.parametrize("behaviour", ["active_ragdoll", "reactive"])
@@ -165,6 +221,14 @@ def test_who_reacts_cannot_be_blind_to_the_ground() -> None:
     with pytest.raises(ConfigurationError, match="'terrain' is felt; a behaviour that reacts"):
         plan = make_plan("humanoid", 1.0, {"clip": "walk"}, {}, blind)
         make_controller(plan.character, plan.reference, plan.controller)
+
+
+def test_who_reacts_may_begin_elsewhere_but_not_higher(beside: Path) -> None:
+    values = resolve_for(HUMANOID, {"behaviour": "active_ragdoll", "terrain": str(beside)})
+
+    choose_behaviour(HUMANOID.placed(Placement(1.0, -2.0, 0.0, 0.5)), values)
+    with pytest.raises(ConfigurationError, match="'placement' is not at z = 0"):
+        choose_behaviour(HUMANOID.placed(Placement(z=0.5)), values)
 
 
 def test_a_reference_that_is_steered_over_terrain_is_not_carried(beside: Path) -> None:

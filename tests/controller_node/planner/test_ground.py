@@ -192,10 +192,13 @@ def test_what_is_felt_needs_contacts() -> None:
             {"planner": "hybrid", "terrain": FELT},
             "knows the ground at z = 0 alone; it must be plane",
         ),
-        ({"planner": "policy", "terrain": "a.yaml"}, "must be plane, felt or the path of a file"),
+        ({"planner": "policy", "terrain": "a.yaml"}, "must be plane, for planners felt, or the"),
         ({"terrain": FELT, "command_delay_ticks": 1}, "'command_delay_ticks' is 1; it must be 0"),
         ({"terrain": FELT, "plan.contact": "world"}, "'plan.contact' is world; it must be own"),
-        ({"terrain": "flet"}, "'terrain' is flet; it must be plane, felt or the path of a file"),
+        (
+            {"terrain": "flet"},
+            "'terrain' is flet; it must be plane, for planners felt, or the path",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(given: Mapping[str, object], sentence: str) -> None:

@@ -125,6 +125,10 @@ def test_each_shipped_machine_can_be_planned(name: str) -> None:
         ({"states__one__placement": {"law": "guess"}}, "placement.law is 'guess'; it must be"),
         ({"states__one__placement": {"origin": "toe"}}, "placement.origin is 'toe'; it must be"),
         ({"changes": {"bth": {}}}, "changes: unknown state 'bth'; did you mean 'both'?"),
+        (
+            {"changes": {"both": {"root": {"height": -1}}}},
+            "changes.both.root.height is -1; it",
+        ),
         ({"changes": {"both": {"ends": []}}}, "unknown key 'changes.both.ends'; there are: "),
         ({"changes": {"one": {"placement": {"law": "guess"}}}}, "changes.one.placement.law is 'gu"),
         ({"joins": {"bth": []}}, "joins: unknown state 'bth'; did you mean 'both'?"),

@@ -138,6 +138,14 @@ def test_down_from_an_edge_a_foot_is_ahead_sooner_than_on_the_flat() -> None:
     assert max(ahead) > 0.1
 
 
+@pytest.mark.parametrize("was", [1.0 - 1e-10, 1.0])
+def test_a_foot_that_is_all_but_there_comes_down(was: float) -> None:
+    foot, target = Footprint(0.7 + 0j, 0.0, -0.15), Footprint(0.7 + 0j, 0.0, -0.15)
+
+    assert footsteps.swung_on(foot, target, was, 0.0) == target
+    assert footsteps.clearance(foot, target, was) == 0.0
+
+
 def test_along_a_slope_a_foot_goes_as_that_does() -> None:
     lifts, feet = swing(Footprint(0.7 + 0j, 0.0, -0.7 * SLOPE, -SLOPE + 0j))
 
