@@ -100,6 +100,42 @@ def test_it_turns_to_the_opponent_no_faster_than_it_may() -> None:
     assert turns[-1] == pytest.approx(0.5 * math.pi)
 
 
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Ground that is higher by 0.6 m from x = 1 m on, below a roof."""
+    path = tmp_path_factory.mktemp("terrain") / "table.yaml"
+    path.write_text(
+        "boxes: [{at: [3, 0], size: [4, 4, 0.6]}, {at: [0, 0, 2.5], size: [9, 9, 0.1]}]"
+    )
+    return str(path)
+
+
+@pytest.mark.parametrize(("height", "way"), [(1.0, -1.0), (1.48, 1.0)])
+def test_an_opponent_is_down_by_its_height_over_its_ground(
+    height: float, way: float, table: str
+) -> None:
+    fighter = Fighter(terrain=table)
+
+    fighter.sees(1.9, 0.0, height)
+
+    assert np.sign(fighter.lead[0]) == way
+
+
+def test_on_a_table_it_is_drawn_as_high_but_not_at_once(table: str) -> None:
+    fighter, heights = Fighter(terrain=table), []
+    for _ in range(10):
+        fighter.sees(4.0, 0.0, 1.48)
+    on_ground = fighter.target.position[2]
+    fighter.position[0], fighter.position[2] = 1.5, REST[2] + 0.6
+    for _ in range(480):
+        fighter.sees(4.0, 0.0, 1.48)
+        heights.append(fighter.target.position[2] - on_ground)
+
+    assert on_ground == pytest.approx(REST[2])  # the roof is no ground
+    assert heights[-1] == pytest.approx(0.6)
+    assert np.diff(heights).max() < 0.003  # m a tick
+
+
 @pytest.mark.parametrize(
     ("distance", "height", "way"), [(1.9, 0.4, -1.0), (2.1, 0.4, 1.0), (1.9, 0.88, 1.0)]
 )
