@@ -187,7 +187,7 @@ def test_a_contact_without_end_is_refused_in_a_line_and_ends_nothing(
     assert node.exit_code is None
 
 
-def test_on_other_ground_than_the_plane_a_behaviour_that_tells_hits_answers_nothing_and_says_why(
+def test_on_ground_that_it_does_not_know_a_behaviour_that_tells_hits_answers_nothing_and_says_why(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
     box = tmp_path / "box.urdf"
@@ -196,9 +196,16 @@ def test_on_other_ground_than_the_plane_a_behaviour_that_tells_hits_answers_noth
         "</collision></link></robot>"
     )
     own = {"behaviour": "reactive"}
-    with pytest.raises(ConfigurationError, match=r"'terrain' is .*box\.urdf; it must be plane"):
-        make_plan("humanoid", 0.5, {"reference": "clip"}, {"terrain": str(box)}, own)
-    make_plan("humanoid", 0.5, {"reference": "clip"}, {"terrain": "none"}, own)
+    with pytest.raises(ConfigurationError, match=r"is plane, but sim_node's is .*box\.urdf;"):
+        make_plan(
+            "humanoid",
+            0.5,
+            {"reference": "clip"},
+            {"terrain": str(box)},
+            {**own, "terrain": "plane"},
+        )
+    for terrain in (str(box), "none"):
+        make_plan("humanoid", 0.5, {"reference": "clip"}, {"terrain": terrain}, own)
     joints = ["root", *HUMANOID.layout.actuated_joint_names]
 
     processes.simulator("humanoid", terrain=str(box), commanded_joints=joints)
