@@ -20,7 +20,6 @@ SHARED = {
     "launch": "*.launch.py",
     "config": "*.*",
     "examples": "*.*",
-    "examples/terrains": "*",
     "examples/trials": "*",
     "examples/without_rclpy": "*",
 }
@@ -61,7 +60,7 @@ setup(
     packages=find_packages(include=[pattern for root in ROOTS for pattern in (root, f"{root}.*")]),
     package_data={
         "": ["py.typed"],
-        "msgs_config": ["runtime/*.xml", "character/data/*"],
+        "msgs_config": ["runtime/*.xml", "character/data/*", "terrain/data/*"],
         "controller_node": [
             "references/data/*.yaml",
             "references/timeline/data/*.yaml",

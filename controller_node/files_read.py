@@ -8,7 +8,7 @@ from controller_node.behaviours.onnx_policy.factory import ONNX, policy_files
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
 from controller_node.behaviours.state_machine.file import machine_path
 from controller_node.controller_settings import LawSettings
-from controller_node.ground import FELT, GroundSettings, terrain_path
+from controller_node.ground import NO_FILE, GroundSettings
 from controller_node.planner.settings import HYBRID, POLICY, PlannerParameters
 from controller_node.references.clip import ClipSettings
 from controller_node.references.factory import MotionSettings
@@ -19,7 +19,7 @@ from controller_node.references.timeline.motion import TimelineSettings
 from msgs_config.character.model import Character
 from msgs_config.clips.reading import clip_path
 from msgs_config.parameters import Values
-from msgs_config.shared_parameters import PLANE
+from msgs_config.terrain.file import terrain_path
 
 
 def files_read(character: Character, values: Values) -> dict[str, Path]:
@@ -44,8 +44,8 @@ def files_read(character: Character, values: Values) -> dict[str, Path]:
         from controller_node.planner.policy.choosing import policies_read  # compiled code
 
         files |= policies_read(character, values, clips)
-    if (terrain := GroundSettings.of(values).terrain) not in (PLANE, FELT):
-        files["terrain"] = terrain_path(terrain)
+    if (terrain := GroundSettings.of(values).terrain) not in NO_FILE:
+        files["terrain"] = terrain_path(terrain, NO_FILE)
     if feedforward := LawSettings.of(values).feedforward:
         files["feedforward"] = Path(feedforward)
     return files

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from controller_node.references.base import Motion
 from controller_node.references.steering.reference import SteeredReference
-from msgs_config import files
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character, Placement, Shape
 from msgs_config.character.terrain import terrain_shapes
@@ -20,6 +18,7 @@ from msgs_config.terrain.heights import Heights
 from msgs_config.terrain.surfaces import Surfaces
 
 FELT = "felt"
+NO_FILE = (PLANE, FELT)  # values of the parameter that name no terrain
 
 
 class Terrain:
@@ -40,8 +39,8 @@ class GroundSettings(Settings):
     terrain: str = parameter(
         PLANE,
         "what planner predictive, reactions to hits and a steered reference take for the ground: "
-        "plane; the path of sim_node's terrain, which `run` hands over to the former two; or, but "
-        "for reactions, felt: a plane as high as the feet that stand, whatever there is",
+        "plane; sim_node's terrain, which `run` hands over to the former two; or, but for "
+        "reactions, felt: a plane as high as the feet that stand, whatever there is",
     )
 
 
@@ -54,24 +53,7 @@ def ground_shapes(terrain: str) -> list[Shape]:
     Raises:
         ActuatedCharactersError: the file cannot be used, or there is none.
     """
-    if terrain in (PLANE, FELT):
-        return []
-    return terrain_shapes(read_terrain(str(terrain_path(terrain))))
-
-
-def terrain_path(terrain: str) -> Path:
-    """The file that a parameter `terrain` names.
-
-    Raises:
-        ConfigurationError: there is none; says what else the parameter may be.
-    """
-    path = files.resolve(terrain, Path.cwd(), ConfigurationError)
-    if not path.is_file():
-        raise ConfigurationError(
-            f"parameter '{TERRAIN.name}' is {terrain}; it must be {PLANE}, for planners {FELT}, or "
-            f"the path of a file, and there is no {path}"
-        )
-    return path
+    return [] if terrain in NO_FILE else terrain_shapes(read_terrain(terrain, NO_FILE))
 
 
 def check_placement(character: Character) -> None:

@@ -7,7 +7,7 @@ from msgs_config.errors import ConfigurationError
 from msgs_config.settings import Settings, parameter
 
 DEFAULT_CHARACTER = "humanoid"
-PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any other is a URDF's path
+PLANE, NO_GROUND = "plane", "none"  # values of a simulator's `terrain`; any other is a file
 FROM_FILE, NO_COLLISIONS = "file", "none"
 LINK_FRICTION = 0.5  # of a simulator's links, unless it is told otherwise
 

@@ -1,4 +1,4 @@
-"""Where a character begins: as parameters say, or as its controller's reference does. No ROS."""
+"""A character's own parameters: its masses, and where it begins. No ROS."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,16 @@ _LIMIT_ROUNDING = 1e-9  # rad or m by which a position may be beyond its limits
 
 
 class CharacterSettings(Settings):
-    """What of a character is commanded, and where it begins. The defaults are the character's."""
+    """How heavy a character is, what of it is commanded, and where it begins.
+
+    The defaults are the character's.
+    """
+
+    mass_factors: tuple[str, ...] = parameter(
+        (),
+        "links that are so many times as heavy as the character's file says, and no controller "
+        "knows of it: LINK:FACTOR, or *:FACTOR for all",
+    )
 
     commanded_joints: tuple[str, ...] = parameter(
         (), "the joints that must be commanded, and that alone may be; with 'root': assistance"

@@ -1,17 +1,22 @@
 """What `sim_node` itself is set to, beside the simulation."""
 
+from msgs_config.character.sensors import LARGEST_NOISE, SensorType
 from msgs_config.character.urdf.ros2_control import COMMAND_INTERFACES
 from msgs_config.messages.clock import NANOSECONDS_PER_SECOND, TickClock
 from msgs_config.messages.session import GivenSession
 from msgs_config.settings import Settings, parameter, shared
 from msgs_config.shared_parameters import GRAVITY, RATE, KeyframeSettings
 from sim_node.frames import FrameNames
+from sim_node.named_numbers import named_numbers
 
 _LARGEST_COUNT = 2**62
 
 
 class SensingSettings(Settings):
-    """What readings depend on beside states, contacts and the sensor itself."""
+    """What readings depend on beside states, contacts and the sensor itself.
+
+    Raises ConfigurationError if the noise is of no quantity that a sensor measures.
+    """
 
     rate_hz: int = shared(RATE)
     gravity: float = shared(GRAVITY)  # m/s^2, along -z
@@ -21,6 +26,22 @@ class SensingSettings(Settings):
         name="sensor_seed",
         maximum=_LARGEST_COUNT,
     )
+    noise: tuple[str, ...] = parameter(
+        (),
+        "white noise of all sensors in place of their own in the character's file: "
+        "QUANTITY:DEVIATION, such as angular_velocity:0.02, in the quantity's unit",
+        name="sensor_noise",
+    )
+
+    def __post_init__(self) -> None:
+        self.deviations()
+
+    def deviations(self) -> dict[str, float]:
+        """The standard deviations of white noise, by quantities."""
+        names = [quantity for kind in SensorType for quantity in kind.quantities]
+        return dict(
+            named_numbers("sensor_noise", self.noise, "quantity", names, (0.0, LARGEST_NOISE))
+        )
 
     @property
     def tick_s(self) -> float:

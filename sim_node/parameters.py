@@ -19,7 +19,8 @@ from sim_node.initial_state import (
     check_given,
     check_length,
 )
-from sim_node.node_settings import NodeSettings
+from sim_node.node_settings import NodeSettings, SensingSettings
+from sim_node.physics.mass_factors import with_mass_factors
 from sim_node.physics.settings import SimulationSettings
 
 _NEEDED_FIRST = CharacterSource.declared()
@@ -201,8 +202,11 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
         character = placed(load_character(name_or_path, collides(first)), first)
         values = resolve_alone(character, given)
         check_given(values, given)
+        SensingSettings.of(values)  # which refuses what is wrong
         FrameNames.of(values).check(character)
-        character.check_driven(CharacterSettings.of(values).commanded_joints)
+        own = CharacterSettings.of(values)
+        character.check_driven(own.commanded_joints)
+        with_mass_factors(character, own.mass_factors)
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
     return CharacterParameters(name, character, values)

@@ -35,6 +35,7 @@ def make_character_setup(character: Character, values: Values, name: str = "") -
         initial_position=own.initial_position,
         initial_velocity=own.initial_velocity,
         name=name,
+        mass_factors=own.mass_factors,
     )
 
 

@@ -132,6 +132,7 @@ class Link:
     inertial_pose: Pose  # pose of the principal axes in the link frame
     shapes: tuple[Shape, ...] = ()  # the shapes that are seen
     collision_shapes: tuple[Shape, ...] = ()
+    mass_factor: float = 1.0  # by which mass and inertia are another than its file says
 
     def inertia_in_link_axes(self) -> FloatArray:
         """Its inertia (3, 3) about its centre of mass along its own axes, kg m^2."""

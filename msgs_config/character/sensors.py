@@ -15,7 +15,7 @@ _ZERO: scalars.Vector = (0.0, 0.0, 0.0)
 _WORLD = "world"  # a frame that is there for every character
 _MAX_OFFSET = 1e3  # m from the link's origin
 _LARGEST_ANGLE = 2.0 * math.pi  # rad; degrees are mostly more
-_LARGEST_NOISE = 1e9  # its square is a number as well, in any unit
+LARGEST_NOISE = 1e9  # its square is a number as well, in any unit
 _MOST_LETTERS = 64
 _SENSOR_KEYS = ("link", "xyz", "rpy", "noise")
 _NOISE_KEYS = ("stddev", "bias", "bias_stddev", "bias_walk")
@@ -133,7 +133,7 @@ def _read_noise(reader: MappingReader) -> Noise:
 
 def _per_axis(reader: MappingReader, key: str) -> scalars.Vector:
     """A number for each axis: a list of three, or one for all; a deviation is not negative."""
-    bounds = (-_LARGEST_NOISE if key == "bias" else 0.0, _LARGEST_NOISE)
+    bounds = (-LARGEST_NOISE if key == "bias" else 0.0, LARGEST_NOISE)
     if isinstance(reader.content[key], list):
         return _vector(reader.numbers(key, 3, bounds))
     return (reader.number(key, minimum=bounds[0], maximum=bounds[1]),) * 3

@@ -8,14 +8,17 @@ from msgs_config import files
 from msgs_config.character.model import UrdfOptions
 from msgs_config.character.urdf.check import check_urdf
 from msgs_config.character.urdf.file_formats.source import read_urdf_text
-from msgs_config.errors import CharacterError
+from msgs_config.errors import CharacterError, one_of
 from msgs_config.mappings import MappingReader
+from msgs_config.shared_parameters import NO_GROUND, PLANE
 from msgs_config.terrain.pieces import Block, placed, random_heights, slope, squares, stairs
 from msgs_config.terrain.urdf import write_terrain
 
+TERRAINS_DIRECTORY = Path(__file__).parent / "data"
+
 SUFFIXES = (".yaml", ".yml")
 """Of files that are no URDF."""
-_GROUND = ["plane", "none"]
+_GROUND = [PLANE, NO_GROUND]
 _PLACE = ("at", "towards")
 _MOST = 1000.0  # m, as far as numbers go
 _STEEPEST = 40.0  # degrees
@@ -25,13 +28,33 @@ _PLANE = (
 )
 
 
-def read_terrain(path: str) -> UrdfOptions:
-    """The terrain that a parameter `terrain` names.
+def shipped_terrains() -> list[str]:
+    """The names of the terrains that come with the package."""
+    return sorted(path.stem for path in TERRAINS_DIRECTORY.glob("*.yaml"))
+
+
+def terrain_path(name_or_path: str, besides: Sequence[str] = _GROUND) -> Path:
+    """The file of a shipped terrain, or that of a path, which has a suffix or a `/`.
 
     Raises:
-        CharacterError: its file cannot be used.
+        CharacterError: there is no such terrain or package; names those that there are, and what
+            the parameter may be besides.
     """
-    file = files.resolve(path, Path.cwd(), CharacterError)
+    if Path(name_or_path).suffix or "/" in name_or_path:
+        return files.resolve(name_or_path, Path.cwd(), CharacterError)
+    if name_or_path not in shipped_terrains():
+        sentence = one_of("terrain", name_or_path, [*besides, *shipped_terrains()])
+        raise CharacterError(f"{sentence}; or the path of a .yaml file or URDF")
+    return TERRAINS_DIRECTORY / f"{name_or_path}.yaml"
+
+
+def read_terrain(name_or_path: str, besides: Sequence[str] = _GROUND) -> UrdfOptions:
+    """The terrain that a parameter `terrain` names; see `terrain_path`.
+
+    Raises:
+        CharacterError: its file cannot be used, or there is none.
+    """
+    file = terrain_path(name_or_path, besides)
     text = (
         terrain_urdf(file, files.read_text(file, CharacterError))
         if file.suffix in SUFFIXES
@@ -58,7 +81,7 @@ def terrain_urdf(path: Path, text: str) -> str:
     count = len([block for blocks in pieces.values() for block in blocks])
     if count > _MOST_BLOCKS:
         raise CharacterError(f"{path}: these are {count:,} boxes; there may be {_MOST_BLOCKS:,}")
-    has_plane = reader.choice("ground", _GROUND) == "plane"
+    has_plane = reader.choice("ground", _GROUND) == PLANE
     if not has_plane and not count:
         raise CharacterError(f"{path} has neither a ground nor pieces")
     return write_terrain({name: each for name, each in pieces.items() if each}, plane=has_plane)

@@ -31,7 +31,7 @@ _EXACT_VARIANCE = 1e-9  # m^2, rad^2 or their rates': a zero would mean that it 
 
 def _describe(node: BusNode, character: SimulatedCharacter, settings: NodeSettings) -> str:
     """The character's URDF, with a tag of ros2_control if it is asked for."""
-    whole, name = character.character, character.setup.name
+    whole, name = character.setup.character, character.setup.name
     description = robot_description(whole, settings.frames.base)
     if not settings.ros2_control:
         return description

@@ -106,7 +106,7 @@ class CharacterPublishers:
             CharacterError: a mesh of the character or of the terrain cannot be read.
         """
         text = configuration.describe(
-            self._character.character,
+            self._character.setup.character,
             values,
             since_ns,
             probe=sample,

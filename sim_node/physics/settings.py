@@ -51,7 +51,8 @@ class SimulationSettings(Settings):
     substeps: int = parameter(1, "engine steps a tick", minimum=1, maximum=1000)
     world: WorldSettings = WorldSettings()
     terrain: str = parameter(
-        PLANE, "the ground: plane, none, or the path of a .yaml file of terrain, or of a URDF"
+        PLANE,
+        "the ground: plane, none, name of a shipped terrain, or path of a .yaml file or a URDF",
     )
     speed_limit: float = parameter(500.0, "a speed beyond it is a divergence", unit="rad/s or m/s")
     ball_lifetime: float = parameter(

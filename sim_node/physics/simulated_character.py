@@ -13,6 +13,7 @@ from msgs_config.errors import SimulationError
 from msgs_config.messages.state import StampedState
 from sim_node.initial_state import check_length
 from sim_node.physics.engine import Balls, Body
+from sim_node.physics.mass_factors import with_mass_factors
 from sim_node.physics.passive_forces import PassiveForces
 from sim_node.physics.pin_forces import PinForces
 from sim_node.physics.pins import Pin, changed_pins
@@ -29,6 +30,7 @@ class CharacterSetup:
     initial_position: tuple[float, ...]  # (n,)
     initial_velocity: tuple[float, ...]  # (n,)
     name: str = ""  # the character's name, where there are several
+    mass_factors: tuple[str, ...] = ()  # see `with_mass_factors`
 
     @property
     def prefix(self) -> str:
@@ -63,6 +65,7 @@ class CharacterSnapshot:
 class SimulatedCharacter:
     """A character in a world."""
 
+    character: Character  # as it is simulated; `setup` has it as its file says
     state: StampedState
     before: StampedState | None  # the state a tick earlier; None in an episode's first one
     pushes: tuple[ExternalWrench, ...]  # those that acted during the last tick, pins' forces last
@@ -85,11 +88,11 @@ class SimulatedCharacter:
         A speed beyond the limit, in rad/s or m/s, counts as divergence.
 
         Raises:
-            ConfigurationError: an array does not fit the character.
+            ConfigurationError: an array or a mass does not fit the character.
             LayoutError: a commanded joint does not exist.
         """
         self.setup = setup
-        self.character = setup.character
+        self.character = with_mass_factors(setup.character, setup.mass_factors)
         self.layout = setup.character.layout
         self.commanded: BoolArray = self.layout.mask(setup.commanded_joints)
         self._limits = EffortLimits(self.layout, setup.character.effort_limits())
@@ -103,7 +106,7 @@ class SimulatedCharacter:
         self._step_s, self._period = step_s, step_s * substeps
         self._pin_forces: PinForces | None = None  # None: there was no pin yet
         self._delay_ticks = delay_ticks
-        self.speed_bounds = speed_bounds(setup.character, step_s, speed_limit)
+        self.speed_bounds = speed_bounds(self.character, step_s, speed_limit)
         # (2, n) largest position and velocity of a sound state
         self._bounds = np.array([[np.finfo(float).max], [speed_limit]]).repeat(self.layout.size, 1)
 

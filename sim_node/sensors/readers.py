@@ -6,6 +6,7 @@ the difference between its velocities in the last two states, over the tick.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -38,12 +39,21 @@ class SensorReader:
         name = f"{character.setup.prefix}{sensor.name}"
         self._noise = {
             quantity: NoiseSource(noise, settings.seed, f"{name}.{quantity}", settings.tick_s)
-            for quantity, noise in sensor.noise.items()
+            for quantity, noise in self._own_noise().items()
         }
 
     def read(self, tick: int) -> FloatArray | None:
         """All doubles of the sensor's message at a tick; None if it has nothing to say."""
         raise NotImplementedError
+
+    def _own_noise(self) -> dict[str, Noise]:
+        """The noise of each quantity: the sensor's own, white noise as the settings have it."""
+        noise = dict(self._sensor.noise)
+        for quantity, deviation in self._settings.deviations().items():
+            if quantity in self._sensor.type.quantities:
+                white = (deviation,) * 3
+                noise[quantity] = replace(noise.get(quantity, Noise()), stddev=white)
+        return noise
 
     def _with_noise(self, quantity: str, value: scalars.Vector, tick: int) -> scalars.Vector:
         if quantity not in self._noise:
@@ -70,7 +80,7 @@ class ImuReader(SensorReader):
         super().__init__(character, sensor, settings)
         self._doubles = np.zeros(_IMU_DOUBLES)
         for quantity, start in _COVARIANCES.items():
-            deviations = np.array(sensor.noise.get(quantity, Noise()).stddev)
+            deviations = np.array(self._own_noise().get(quantity, Noise()).stddev)
             self._doubles[start : start + 9 : _DIAGONAL] = deviations * deviations
         self._last: tuple[StampedState | None, FrameMotion] = (None, AT_REST)
         self._first_variance = self._doubles[_COVARIANCES["linear_acceleration"]]

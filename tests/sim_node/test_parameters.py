@@ -26,6 +26,7 @@ OWN = [
     "character",
     "collision",
     "placement",
+    "mass_factors",
     "commanded_joints",
     "initial_state",
     "initial_position",
@@ -296,7 +297,7 @@ BROKEN = [
     [
         ("moon.urdf", None, "moon.urdf"),
         ("Plane", None, "Plane"),
-        ("", None, "not a file"),
+        ("", None, "unknown terrain ''; there are: plane, none, rubble"),
         ("package://no_such_package/moon.urdf", None, "no_such_package"),
         ("/dev/null", None, "not a file"),
         *(("broken.urdf", text, r"broken\.urdf") for text in BROKEN),

@@ -17,7 +17,7 @@ from msgs_config.character.model import Character, Pose
 from msgs_config.geometry import fixed_order, rotations, scalars
 from sim_node.physics.bullet.balls import BulletBalls
 from sim_node.physics.bullet.client import Engine, load_urdf, pybullet
-from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics
+from sim_node.physics.bullet.defaults import remove_motors, set_link_dynamics, set_masses
 from sim_node.physics.bullet.ground import choose_ground
 from sim_node.physics.bullet.joint_constraints import couple_joints, set_friction
 from sim_node.physics.bullet.loaded_links import check_links
@@ -97,6 +97,7 @@ class BulletBody:
         numbers = {info[1].decode(): info[0] for info in infos}
         # the engine's number of each link; -1 is the base
         self._numbers = [-1, *(numbers[link.joint.name] for link in character.links[1:])]
+        set_masses(self._client, self._body, self._numbers, character)
         check_links(self._client, self._body, self._numbers, character)
         self._row = {number: row for row, number in enumerate(self._numbers)}
         joints = [j for j in self._layout.joints if j.type is not JointType.FLOATING]

@@ -1,7 +1,8 @@
-"""Bullet's defaults that a character does without: damping, a limit on speed, joint motors."""
+"""What is not as Bullet loads it: masses, damping, a limit on speed, joint motors."""
 
 from collections.abc import Sequence
 
+from msgs_config.character.model import Character
 from msgs_config.geometry import rotations
 from sim_node.physics.bullet.client import Engine, pybullet
 
@@ -21,6 +22,18 @@ def set_link_dynamics(client: Engine, body: int, friction: float, speed_bound: f
     for link in range(-1, pybullet.getNumJoints(body, physicsClientId=client)):
         for setting in settings:
             pybullet.changeDynamics(body, link, **setting, physicsClientId=client)
+
+
+def set_masses(client: Engine, body: int, numbers: Sequence[int], character: Character) -> None:
+    """Set mass and inertia of the links that are heavier or lighter than their URDF says.
+
+    `numbers` are the engine's, a link each.
+    """
+    for link, number in zip(character.links, numbers, strict=True):
+        if link.mass_factor != 1.0:
+            # The mass first: with it alone the engine makes up an inertia from the shapes.
+            for setting in ({"mass": link.mass}, {"localInertiaDiagonal": link.inertia_diagonal}):
+                pybullet.changeDynamics(body, number, **setting, physicsClientId=client)
 
 
 def remove_motors(client: Engine, body: int, joints: Sequence[int], balls: Sequence[int]) -> None:

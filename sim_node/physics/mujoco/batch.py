@@ -43,6 +43,10 @@ class MujocoBatch:
                 f"a batch has no joints with damping, friction or mimics, as {character.file.name} "
                 "has; take a Simulation for each"
             )
+        if setup.character.mass_factors:
+            raise ConfigurationError(
+                "parameter 'mass_factors': a batch has none; take a Simulation for each"
+            )
         one = SimulatedCharacter(
             setup.character,
             delay_ticks=settings.command_delay_ticks,

@@ -230,6 +230,7 @@ def test_a_world_that_diverges_stays_and_the_others_go_on() -> None:
         ({"simulator": {"characters": ["a", "b"]}}, "unknown parameter 'characters'"),
         ({"simulator": {"rate": 100}, "rate": 240}, "must be the same"),
         ({"simulator": {"initial_velocity": [0.0]}}, "'initial_velocity': worlds begin where"),
+        ({"simulator": {"mass_factors": ["chest:2"]}}, "'mass_factors': a batch has none"),
         ({"planner": "predictive"}, "'planner' is predictive; in a batch it must be none"),
         ({"behaviour": "ragdoll"}, "'behaviour' is ragdoll; in a batch it must be tracking"),
         ({"law": "pid"}, "'law' is pid; in a batch it must be stable_pd"),

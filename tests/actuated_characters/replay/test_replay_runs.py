@@ -78,7 +78,11 @@ def test_a_pushed_fall_comes_again(tmp_path: Path, own_handlers: None) -> None:
     assert result.difference is None and result.states == 361
 
 
-@pytest.mark.parametrize("given", [{}, {"command_delay_ticks": 3, "substeps": 2}], ids=str)
+@pytest.mark.parametrize(
+    "given",
+    [{}, {"command_delay_ticks": 3, "substeps": 2, "mass_factors": ["*:1.2", "chest:1.5"]}],
+    ids=str,
+)
 def test_two_resets_a_pause_and_clipped_torques_come_again(
     processes: Processes, client: SimulatorClient, tmp_path: Path, given: dict[str, object]
 ) -> None:

@@ -19,7 +19,7 @@ from controller_node.planner.felt_ground import FeltGround
 from msgs_config.character.dynamics import still_model
 from msgs_config.character.lowest_points import lowest_heights
 from msgs_config.character.model import Pose, Shape, ShapeType
-from msgs_config.errors import ConfigurationError
+from msgs_config.errors import ActuatedCharactersError, ConfigurationError
 from msgs_config.messages.state import StampedState
 from sim_node.simulation_factory import make_simulation_settings
 from tests.support.physics import character
@@ -170,7 +170,7 @@ def test_who_knows_the_terrain_is_where_it_is() -> None:
             "humanoid",
             1.0,
             {"reference": "steered"},
-            {"terrain": "examples/terrains/stairs.yaml"},
+            {"terrain": "stairs"},
             given,
         )
 
@@ -192,19 +192,19 @@ def test_what_is_felt_needs_contacts() -> None:
             {"planner": "hybrid", "terrain": FELT},
             "knows the ground at z = 0 alone; it must be plane",
         ),
-        ({"planner": "policy", "terrain": "a.yaml"}, "must be plane, for planners felt, or the"),
+        ({"terrain": "a.yaml"}, "a.yaml: No such file"),
         ({"terrain": FELT, "command_delay_ticks": 1}, "'command_delay_ticks' is 1; it must be 0"),
         ({"terrain": FELT, "plan.contact": "world"}, "'plan.contact' is world; it must be own"),
         (
             {"terrain": "flet"},
-            "'terrain' is flet; it must be plane, for planners felt, or the path",
+            "unknown terrain 'flet'; did you mean 'felt'\\? there are: plane, felt, rubble, slope",
         ),
     ],
 )
 def test_what_cannot_be_is_refused(given: Mapping[str, object], sentence: str) -> None:
     controller = {"planner": "predictive", **given}
 
-    with pytest.raises(ConfigurationError, match=sentence):
+    with pytest.raises(ActuatedCharactersError, match=sentence):
         make_plan("humanoid", 1.0, {"reference": "steered"}, {}, controller)
 
 

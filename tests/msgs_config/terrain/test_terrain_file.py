@@ -11,7 +11,7 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import UrdfOptions
 from msgs_config.errors import CharacterError
-from msgs_config.terrain.file import terrain_urdf
+from msgs_config.terrain.file import read_terrain, shipped_terrains, terrain_urdf
 from sim_node.physics.engine import make_world
 from sim_node.physics.settings import WorldSettings
 
@@ -153,3 +153,10 @@ def test_what_is_wrong_is_one_line_with_its_place(text: str, sentence: str, tmp_
     assert str(caught.value).startswith(f"{tmp_path / 'a.yaml'}: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_those_that_are_shipped_have_names() -> None:
+    assert shipped_terrains() == ["rubble", "slope", "stairs", "steps"]
+    assert all("<collision>" in read_terrain(name).urdf_text for name in shipped_terrains())
+    with pytest.raises(CharacterError, match="did you mean 'stairs'"):
+        read_terrain("stair")

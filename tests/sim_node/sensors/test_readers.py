@@ -9,9 +9,11 @@ import pytest
 from msgs_config.arrays import FloatArray
 from msgs_config.character.model import Character
 from msgs_config.character.sensors import Noise, Sensor, SensorType
+from msgs_config.errors import ConfigurationError
 from msgs_config.geometry import rotations
 from sim_node import parameters as for_simulator
 from sim_node.node_settings import SensingSettings
+from sim_node.parameters import load_parameters
 from sim_node.sensors.link_motion import LinkKinematics
 from sim_node.sensors.readers import ForceReader, ImuReader, SensorReader
 from sim_node.simulation_factory import make_character_setup, make_simulation_settings
@@ -303,6 +305,41 @@ def test_noise_is_added_to_each_quantity_and_its_variance_is_the_covariance() ->
 
     wrenches = force_sensor("left_ankle", torque=Noise(bias=(1.0, 2.0, 3.0)))
     assert read(run, reader(run, wrenches))[3:] == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_settings_have_white_noise_in_place_of_the_sensors_own() -> None:
+    run = simulation("humanoid")
+    own = Noise(stddev=(0.1, 0.2, 0.3), bias=(5.0, 0.0, 0.0))
+    settings = SensingSettings(RATE, G, 0, ("angular_velocity:0.5", "force:2"))
+    sensor = imu("chest", POSE, angular_velocity=own, orientation=Noise(stddev=(0.01,) * 3))
+    noisy = reader(run, sensor, settings)
+
+    rates = []
+    for tick in range(1, 2001):
+        values = noisy.read(tick)
+        assert values is not None
+        rates.append(rate(values).copy())
+
+    assert np.std(rates, axis=0) == pytest.approx([0.5] * 3, rel=0.07)
+    assert np.mean(rates, axis=0) == pytest.approx([5.0, 0.0, 0.0], abs=0.05)
+    values = read(run, noisy)
+    assert values[16:25].reshape(3, 3) == pytest.approx(0.25 * np.eye(3))
+    assert values[4:13].reshape(3, 3) == pytest.approx(1e-4 * np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("noise", "sentence"),
+    [
+        ("speed:1", "'sensor_noise' has 'speed:1': unknown quantity 'speed'; there are: orient"),
+        ("force:-1", "'sensor_noise' has 'force:-1'; it must be QUANTITY:NUMBER, the number 0 to"),
+        ("force", "'sensor_noise' has 'force'; it must be QUANTITY:NUMBER"),
+    ],
+)
+def test_noise_of_what_no_sensor_measures_is_one_line(noise: str, sentence: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        load_parameters({"sensor_noise": [noise]})
+
+    assert sentence in str(caught.value)
 
 
 def test_readings_go_on_after_a_snapshot_as_they_would_have() -> None:
