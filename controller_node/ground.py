@@ -72,9 +72,9 @@ def on_ground(motion: Motion, character: Character, terrain: str) -> Motion:
         CharacterError: the file cannot be used.
         ConfigurationError: the character's own world is not where the terrain's is.
     """
-    shapes, steered = ground_shapes(terrain), motion.reference
+    steered = motion.reference
     if terrain == PLANE or not isinstance(steered, SteeredReference):
         return motion
-    if shapes:
+    if shapes := ground_shapes(terrain):
         check_placement(character)
     return replace(motion, reference=steered.over(Heights(shapes) if shapes else None))

@@ -25,6 +25,7 @@ SINCE = "parameters_after_stamp_ns"
 FILES = "files"
 """The key of SHA-256 of the files that a controller has read, by the parameters' names for them."""
 _TERRAIN = ("terrain_urdf", "terrain_path", "terrain_meshes")
+_WRONG = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
 
 
 def describe(
@@ -86,6 +87,15 @@ def _finite(value: Value) -> Value | None:
 
 
 @dataclass(frozen=True)
+class UrdfCopy:
+    """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
+
+    path: Path
+    text: str = field(repr=False)
+    meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
+
+
+@dataclass(frozen=True)
 class RunConfiguration:
     """The content that a listener needs to read a simulator's topics."""
 
@@ -97,6 +107,7 @@ class RunConfiguration:
     probe: DynamicsSample | None = None  # absent from other simulators
     versions: dict[str, str] = field(default_factory=dict)  # versions of packages by their names
     session: str = ANONYMOUS
+    terrain: UrdfCopy | None = None  # beside or in place of the plane
 
 
 def parse(text: str) -> RunConfiguration:
@@ -121,18 +132,10 @@ def parse(text: str) -> RunConfiguration:
             probe=None if probe is None else read_probe(probe, layout.size),
             versions=read_versions(content.get("versions")),
             session=read_session(str(content.get("session", ""))),
+            terrain=_read_terrain(content),
         )
-    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, LayoutError) as error:
+    except (*_WRONG, OverflowError, LayoutError) as error:
         raise MessageError("not a simulator's configuration") from error
-
-
-@dataclass(frozen=True)
-class UrdfCopy:
-    """A URDF as it was read, and where it lay, which is where its meshes are looked for."""
-
-    path: Path
-    text: str = field(repr=False)
-    meshes: dict[str, str]  # SHA-256 by the name that the URDF gives, see `collision_meshes`
 
 
 @dataclass(frozen=True)
@@ -159,12 +162,16 @@ def parse_world(text: str) -> WorldCopy:
             character_path=Path(str(content["character_path"])),
             character_text=str(content["character_file"]),
             urdf=_read_urdf(content, _CHARACTER),
-            terrain=None if content.get(_TERRAIN[0]) is None else _read_urdf(content, _TERRAIN),
+            terrain=_read_terrain(content),
             name=str(content.get("name", "")),
             characters=tuple(str(name) for name in content.get("characters", ())),
         )
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except _WRONG as error:
         raise MessageError("not a simulator's configuration") from error
+
+
+def _read_terrain(content: dict[str, Any]) -> UrdfCopy | None:
+    return None if content.get(_TERRAIN[0]) is None else _read_urdf(content, _TERRAIN)
 
 
 def _read_urdf(content: dict[str, Any], keys: tuple[str, str, str]) -> UrdfCopy:
