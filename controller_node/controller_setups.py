@@ -7,6 +7,7 @@ import numpy as np
 from controller_node.behaviours.factory import make_motion
 from controller_node.controller import Controller
 from controller_node.files_read import files_read
+from controller_node.ground import GroundSettings, known_terrain
 from controller_node.parameters import (
     commanded_joints,
     describe_planner,
@@ -35,6 +36,7 @@ class ControllerSetup:
     warnings: tuple[str, ...]
     keyframe_format: MemoryFormat
     files: dict[str, str]  # SHA-256 of those that were read, see `files_read`
+    terrain: str  # what it knows to lie on the ground, see `known_terrain`
 
 
 def make_setup(character: Character, values: Values) -> ControllerSetup:
@@ -55,6 +57,7 @@ def make_setup(character: Character, values: Values) -> ControllerSetup:
         warnings=(*motion.warnings, *describe_planner(character, values)),
         keyframe_format=MemoryFormat(*controller.parts),
         files={name: sha256_of(path) for name, path in files_read(character, values).items()},
+        terrain=known_terrain(GroundSettings.of(values).terrain),
     )
 
 

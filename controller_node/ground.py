@@ -1,6 +1,6 @@
 """What a controller takes for the ground."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +8,9 @@ import numpy as np
 from controller_node.references.base import Motion
 from controller_node.references.steering.reference import SteeredReference
 from msgs_config.arrays import FloatArray
+from msgs_config.character.meshes.resolving import collision_meshes
 from msgs_config.character.model import Character, Placement, Shape
-from msgs_config.character.terrain import terrain_shapes
+from msgs_config.character.terrain import pieces_of, terrain_shapes
 from msgs_config.errors import ConfigurationError
 from msgs_config.settings import Settings, parameter
 from msgs_config.shared_parameters import PLANE
@@ -54,6 +55,32 @@ def ground_shapes(terrain: str) -> list[Shape]:
         ActuatedCharactersError: the file cannot be used, or there is none.
     """
     return [] if terrain in NO_FILE else terrain_shapes(read_terrain(terrain, NO_FILE))
+
+
+def known_terrain(terrain: str) -> str:
+    """What lies on the ground that a parameter `terrain` names, see `pieces_of`; empty: no file.
+
+    Raises:
+        CharacterError: the file or a mesh cannot be used, or there is none.
+    """
+    if terrain in NO_FILE:
+        return ""
+    read = read_terrain(terrain, NO_FILE)
+    return pieces_of(read, collision_meshes(read))
+
+
+def check_pieces(
+    own: Mapping[str, object], known: str, simulator: Mapping[str, object], pieces: str
+) -> None:
+    """Raise ConfigurationError if a terrain that is known has other pieces than a simulator's.
+
+    Both have parameters, and pieces as `known_terrain` gives them.
+    """
+    if known != pieces:
+        raise ConfigurationError(
+            f"controller_node's '{TERRAIN.name}' is {own[TERRAIN.name]}, and sim_node's, "
+            f"{simulator.get(TERRAIN.name)}, has other pieces; they must be the same"
+        )
 
 
 def check_placement(character: Character) -> None:

@@ -93,7 +93,7 @@ class ControllerNode(ComposableNode):
             self.node,
             ControllerOptions.of(self._values).session.id,
             controller.clock,
-            lambda found: check_simulator(self._controller, self._character, self._values, found),
+            lambda found: check_simulator(self._setups.in_force, self._character, found),
             logger,
         )
         self._awaited = AwaitedMessages(

@@ -29,7 +29,7 @@ class CharacterSettings(Settings):
     mass_factors: tuple[str, ...] = parameter(
         (),
         "links that are so many times as heavy as the character's file says, and no controller "
-        "knows of it: LINK:FACTOR, or *:FACTOR for all",
+        "knows of it: LINK:FACTOR, or all:FACTOR",
     )
 
     commanded_joints: tuple[str, ...] = parameter(

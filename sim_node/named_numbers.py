@@ -1,6 +1,6 @@
 """Parameters that are lists of NAME:NUMBER."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from msgs_config.errors import ConfigurationError, one_of
 
@@ -11,20 +11,18 @@ def named_numbers(
     what: str,
     names: Sequence[str],
     bounds: tuple[float, float],
-) -> Iterator[tuple[str, float]]:
-    """The names and numbers that a parameter lists; `what` is what it names.
+) -> dict[str, float]:
+    """The numbers that a parameter lists, by what they are of; `what` is what that is.
 
     Raises:
-        ConfigurationError: a name is not among `names`, or a number not within the bounds.
+        ConfigurationError: a name is not among `names` or there twice, or a number is not within
+            the bounds.
     """
-    least, most = bounds
+    (least, most), found = bounds, dict[str, float]()
     for text in texts:
         name, _, number = text.rpartition(":")
-        try:
-            value = float(number)
-        except ValueError:
-            value = float("nan")
-        if not name or not least <= value <= most:
+        value = _number(number)
+        if not name or not least <= value <= most:  # NaN is not within
             raise ConfigurationError(
                 f"parameter '{parameter}' has {text!r}; it must be {what.upper()}:NUMBER, the "
                 f"number {least:g} to {most:g}"
@@ -32,4 +30,14 @@ def named_numbers(
         if name not in names:
             sentence = one_of(what, name, list(names))
             raise ConfigurationError(f"parameter '{parameter}' has {text!r}: {sentence}")
-        yield name, value
+        if name in found:
+            raise ConfigurationError(f"parameter '{parameter}' has {name!r} twice; give it once")
+        found[name] = value
+    return found
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

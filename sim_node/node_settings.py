@@ -20,16 +20,11 @@ class SensingSettings(Settings):
 
     rate_hz: int = shared(RATE)
     gravity: float = shared(GRAVITY)  # m/s^2, along -z
-    seed: int = parameter(
-        0,
-        "of the noise that a character's file gives its sensors",
-        name="sensor_seed",
-        maximum=_LARGEST_COUNT,
-    )
+    seed: int = parameter(0, "of the noise of sensors", name="sensor_seed", maximum=_LARGEST_COUNT)
     noise: tuple[str, ...] = parameter(
         (),
-        "white noise of all sensors in place of their own in the character's file: "
-        "QUANTITY:DEVIATION, such as angular_velocity:0.02, in the quantity's unit",
+        "standard deviation of the white noise of all sensors, in place of that in the character's "
+        "file: QUANTITY:DEVIATION, such as angular_velocity:0.02, in the quantity's unit",
         name="sensor_noise",
     )
 
@@ -39,9 +34,7 @@ class SensingSettings(Settings):
     def deviations(self) -> dict[str, float]:
         """The standard deviations of white noise, by quantities."""
         names = [quantity for kind in SensorType for quantity in kind.quantities]
-        return dict(
-            named_numbers("sensor_noise", self.noise, "quantity", names, (0.0, LARGEST_NOISE))
-        )
+        return named_numbers("sensor_noise", self.noise, "quantity", names, (0.0, LARGEST_NOISE))
 
     @property
     def tick_s(self) -> float:

@@ -58,7 +58,10 @@ def resolve_alone(character: Character, given: Mapping[str, object]) -> Values:
     Raises:
         ConfigurationError: a name or a value is wrong.
     """
-    return resolve(PARAMETERS + character_parameters(character), given)
+    values = resolve(PARAMETERS + character_parameters(character), given)
+    SensingSettings.of(values)  # which refuses what is wrong with it
+    with_mass_factors(character, CharacterSettings.of(values).mass_factors)
+    return values
 
 
 @dataclass(frozen=True)
@@ -202,11 +205,8 @@ def _load_one(name: str, given: Mapping[str, object]) -> CharacterParameters:
         character = placed(load_character(name_or_path, collides(first)), first)
         values = resolve_alone(character, given)
         check_given(values, given)
-        SensingSettings.of(values)  # which refuses what is wrong
         FrameNames.of(values).check(character)
-        own = CharacterSettings.of(values)
-        character.check_driven(own.commanded_joints)
-        with_mass_factors(character, own.mass_factors)
+        character.check_driven(CharacterSettings.of(values).commanded_joints)
     except (ConfigurationError, LayoutError) as error:
         raise ConfigurationError(f"character '{name}': {error}" if name else str(error)) from error
     return CharacterParameters(name, character, values)

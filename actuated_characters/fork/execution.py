@@ -12,8 +12,9 @@ from actuated_characters.fork.plan import ForkPlan
 from actuated_characters.fork.script import Script
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import (
+    known_terrain,
     write_character,
-    write_urdf,
+    write_terrain,
 )
 from actuated_characters.runs.execution import run_over_topics
 from actuated_characters.runs.in_process import Progress, run_in_process
@@ -65,9 +66,8 @@ def with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
     terrain, both = recording.world.terrain, dict[str, str]()
     if not _is_unchanged(recording):
         both[CHARACTER.name] = str(write_character(folder, recording.character))
-    controller, simulator = dict(both), dict(both)
-    if terrain is not None:
-        simulator["terrain"] = str(write_urdf(folder / "terrain.urdf", terrain))
+    simulator = both | write_terrain(folder, terrain)
+    controller = both | known_terrain(folder, terrain, plan.controller)
     for given, raw, name in (
         (simulator, recording.keyframe, topics.SIM_NODE),
         (controller, recording.controller_keyframe, topics.CONTROLLER_NODE),

@@ -10,8 +10,9 @@ from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.replay.command_comparison import CommandComparison, compare_commands
 from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
 from actuated_characters.replay.players.character_files import (
+    known_terrain,
     write_character,
-    write_urdf,
+    write_terrain,
 )
 from actuated_characters.replay.players.controller_parameters import first_parameters
 from actuated_characters.replay.players.main import CONTROLLER, SIMULATOR
@@ -32,16 +33,15 @@ from msgs_config.messages import topics
 from msgs_config.messages.keyframe import write_keyframe
 from msgs_config.messages.session import SESSION, make_session
 from msgs_config.shared_parameters import CHARACTER, COLLISION, PLACEMENT, RESUME_FROM
+from sim_node.initial_state import INITIAL_STATE, CharacterSettings
 from sim_node.parameters import CHARACTERS, WORLD_PARAMETERS
 from sim_node.physics.settings import SimulationSettings
 
-_OF_A_CHARACTER = (
+_OF_A_CHARACTER = [
     COLLISION.name,
     PLACEMENT.name,
-    "commanded_joints",
-    "initial_position",
-    "initial_velocity",
-)
+    *(each.name for each in CharacterSettings.declared() if each.name != INITIAL_STATE),
+]
 _NOT_TO_BE_SET = (
     CHARACTER.name,
     COLLISION.name,
@@ -105,9 +105,7 @@ def _simulator_parameters(
     """The recorded simulator's parameters, for one that waits for each command."""
     first = simulator_values(together[0])
     parameters: dict[str, object] = {each.name: first[each.name] for each in WORLD_PARAMETERS}
-    terrain = together[0].world.terrain
-    if terrain is not None:
-        parameters["terrain"] = str(write_urdf(directory / "terrain.urdf", terrain))
+    parameters |= write_terrain(directory, together[0].world.terrain)
     if together[0].world.characters:
         parameters[CHARACTERS.name] = [recording.world.name for recording in together]
     for number, recording in enumerate(together):
@@ -229,4 +227,6 @@ def _controller_parameters(directory: Path, recording: Recording) -> dict[str, o
             directory, topics.CONTROLLER_NODE, recording.controller_keyframe
         ),
     }
-    return first_parameters(recording) | own_files | {"wait_for_subscribers": 1}
+    parameters = first_parameters(recording)
+    own_files |= known_terrain(directory, recording.world.terrain, parameters)
+    return parameters | own_files | {"wait_for_subscribers": 1}

@@ -14,7 +14,7 @@ from controller_node.behaviours.factory import (
 from controller_node.behaviours.onnx_policy.factory import ONNX, policy_path
 from controller_node.behaviours.settings import REACTIONS
 from controller_node.behaviours.state_machine.factory import STATE_MACHINE, MachineSettings
-from controller_node.ground import TERRAIN
+from controller_node.ground import TERRAIN, GroundSettings, check_pieces, known_terrain
 from controller_node.model_check import check_agreement
 from controller_node.planner.factory import check_planning
 from controller_node.planner.settings import NO_PLANNER, PREDICTIVE, RECORDED, PlannerParameters
@@ -26,7 +26,9 @@ from controller_node.references.timeline.motion import TimelineSettings
 from msgs_config.character.dynamics import DynamicsModel
 from msgs_config.character.layout import ROOT
 from msgs_config.character.loading import load_character
+from msgs_config.character.meshes.resolving import collision_meshes
 from msgs_config.character.model import Character
+from msgs_config.character.terrain import pieces_of
 from msgs_config.errors import ConfigurationError
 from msgs_config.mappings import show_value
 from msgs_config.parameters import Values
@@ -47,6 +49,7 @@ from sim_node.physics.engine import describe_default_engine
 from sim_node.physics.probe import measure_probe
 from sim_node.physics.settings import STEADY_CONTACTS, SimulationSettings, WorldSettings
 from sim_node.physics.short_links import describe_speed_bound
+from sim_node.simulation_factory import make_simulation_settings
 
 SHARED = (
     *("rate", "gravity", "placement", "collision", "command_delay_ticks"),
@@ -149,6 +152,7 @@ def make_plan(
     controller_parameters.check_world(controller, simulator)
     settings = SimulationSettings.of(simulator)
     _check_engines(character, settings.world)
+    _check_terrain(simulator, controller)
     _check_commanded(simulator, commanded)
     warnings = character.warnings + motion.warnings
     warnings += controller_parameters.describe_planner(character, controller)
@@ -256,6 +260,15 @@ def _keep_assistance_in_step(
     commanded = simulator.get("commanded_joints")
     if isinstance(commanded, list) and character.layout.has_floating_base:
         controller.setdefault("root_assistance", ROOT in commanded)
+
+
+def _check_terrain(simulator: Values, controller: Values) -> None:
+    """The simulator's must be readable, and a controller that knows one must know the same."""
+    terrain = make_simulation_settings(simulator).world.terrain
+    known = known_terrain(GroundSettings.of(controller).terrain)
+    if terrain is not None and known:
+        pieces = pieces_of(terrain, collision_meshes(terrain))
+        check_pieces(controller, known, simulator, pieces)
 
 
 def _check_commanded(simulator: Values, commanded: list[str]) -> None:

@@ -1,5 +1,7 @@
 """What a terrain's URDF collides with, where it lies: no joint of a terrain ever moves."""
 
+import copy
+from collections.abc import Mapping
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -38,6 +40,26 @@ def terrain_shapes(loading: UrdfOptions) -> list[Shape]:
         place = _composed(frames[name], pose).scaled(loading.scale)
         shapes.append(Shape(ShapeType.BOX, _PLANE_EDGES, place))
     return shapes
+
+
+def pieces_of(loading: UrdfOptions, meshes: Mapping[str, str]) -> str:
+    """What collides, as a text that is the same for equal content, wherever its files lie.
+
+    Args:
+        loading: The terrain.
+        meshes: SHA-256 of each mesh by its name in the URDF, see `collision_meshes`.
+
+    Raises:
+        CharacterError: it is no URDF.
+    """
+    robot = copy.deepcopy(loading.robot)
+    for link in robot.findall("link"):
+        for seen in link.findall("visual"):
+            link.remove(seen)
+    for mesh in robot.iter("mesh"):
+        name = mesh.get("filename", "")
+        mesh.set("filename", meshes.get(name, name))
+    return ElementTree.canonicalize(ElementTree.tostring(robot), strip_text=True)
 
 
 def is_plane(shape: Shape) -> bool:

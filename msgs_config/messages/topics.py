@@ -463,9 +463,9 @@ CONFIGURATION = Topic(
     session=SessionPlace.CONFIGURATION,
     is_measured=True,
     content=(
-        "latched, JSON: character file, URDF text, parameters (the initial state among them) and "
-        "the stamp after which they are in force, its `session`, versions of package, engines, "
-        "numpy, Python and C library; again at a reset with changed parameters"
+        "latched, JSON: character file, URDF text, that of the terrain, parameters (the initial "
+        "state among them) and the stamp after which they are in force, its `session`, versions of "
+        "package, engines, numpy, Python and C library; again at a reset with changed parameters"
     ),
 )
 CONTROLLER_CONFIGURATION = Topic(

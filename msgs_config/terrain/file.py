@@ -34,18 +34,19 @@ def shipped_terrains() -> list[str]:
 
 
 def terrain_path(name_or_path: str, besides: Sequence[str] = _GROUND) -> Path:
-    """The file of a shipped terrain, or that of a path, which has a suffix or a `/`.
+    """The file of a shipped terrain, or that of a path.
 
     Raises:
         CharacterError: there is no such terrain or package; names those that there are, and what
             the parameter may be besides.
     """
-    if Path(name_or_path).suffix or "/" in name_or_path:
-        return files.resolve(name_or_path, Path.cwd(), CharacterError)
-    if name_or_path not in shipped_terrains():
+    if name_or_path in shipped_terrains():
+        return TERRAINS_DIRECTORY / f"{name_or_path}.yaml"
+    path = files.resolve(name_or_path, Path.cwd(), CharacterError)
+    if not (Path(name_or_path).suffix or "/" in name_or_path or path.is_file()):
         sentence = one_of("terrain", name_or_path, [*besides, *shipped_terrains()])
         raise CharacterError(f"{sentence}; or the path of a .yaml file or URDF")
-    return TERRAINS_DIRECTORY / f"{name_or_path}.yaml"
+    return path
 
 
 def read_terrain(name_or_path: str, besides: Sequence[str] = _GROUND) -> UrdfOptions:

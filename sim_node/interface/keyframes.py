@@ -29,10 +29,11 @@ def read_memory(memory: bytes, simulation: Simulation) -> tuple[Snapshot, int]:
     found = keyframe_format(simulation).read(memory)
     try:
         snapshot, episode_ns = found
-        sizes = [len(each.state.position) for each in snapshot.characters]
+        found_kinds = [(len(e.state.position), e.mass_factors) for e in snapshot.characters]
     except (TypeError, ValueError, AttributeError) as error:
         raise RecordingError("a keyframe cannot be used: it is none of a simulator") from error
-    if sizes != [each.layout.size for each in simulation.characters]:
+    kinds = [(each.layout.size, each.setup.mass_factors) for each in simulation.characters]
+    if found_kinds != kinds:
         raise RecordingError("a keyframe cannot be used: it is of other characters")
     return snapshot, episode_ns
 

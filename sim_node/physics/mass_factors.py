@@ -6,8 +6,8 @@ from dataclasses import replace
 from msgs_config.character.model import Character, Link
 from sim_node.named_numbers import named_numbers
 
-ALL_LINKS = "*"
-_FACTORS = (1e-3, 1e3)  # least and most
+ALL_LINKS = "all"
+_BOUNDS = (0.01, 100.0)
 
 
 def with_mass_factors(character: Character, factors: Sequence[str]) -> Character:
@@ -15,21 +15,19 @@ def with_mass_factors(character: Character, factors: Sequence[str]) -> Character
 
     Args:
         character: As its file says.
-        factors: The parameter `mass_factors`, LINK:FACTOR each; several of one link multiply.
+        factors: The parameter `mass_factors`, LINK:FACTOR each; one for `all` links comes on top.
 
     Raises:
-        ConfigurationError: there is no such link, or a factor is not between 0.001 and 1000.
+        ConfigurationError: a link is not there, is named twice or has no mass, or a factor is not
+            between 0.01 and 100.
     """
-    by_link = dict.fromkeys((link.name for link in character.links), 1.0)
-    for name, factor in named_numbers(
-        "mass_factors", factors, "link", [ALL_LINKS, *by_link], _FACTORS
-    ):
-        for each in by_link if name == ALL_LINKS else [name]:
-            by_link[each] *= factor
-    if all(factor == 1.0 for factor in by_link.values()):
+    if not factors:
         return character
-    pairs = zip(character.links, by_link.values(), strict=True)
-    return replace(character, links=tuple(_heavier(link, factor) for link, factor in pairs))
+    names = [link.name for link in character.links if link.mass]
+    found = named_numbers("mass_factors", factors, "link", [ALL_LINKS, *names], _BOUNDS)
+    for_all = found.get(ALL_LINKS, 1.0)
+    links = (_heavier(link, for_all * found.get(link.name, 1.0)) for link in character.links)
+    return replace(character, links=tuple(links))
 
 
 def _heavier(link: Link, factor: float) -> Link:

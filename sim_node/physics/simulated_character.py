@@ -60,6 +60,7 @@ class CharacterSnapshot:
     saturated_ticks: IntArray  # (b,)
     start: tuple[FloatArray, FloatArray]  # (n,) each, position and velocity of later episodes
     pins: tuple[Pin, ...] = ()
+    mass_factors: tuple[str, ...] = ()  # of the setup; with others it would go on otherwise
 
 
 class SimulatedCharacter:
@@ -224,6 +225,7 @@ class SimulatedCharacter:
             self.saturated_ticks.copy(),
             (self._position, self._velocity),
             self.pins,
+            self.setup.mass_factors,
         )
 
     def restore(self, snapshot: CharacterSnapshot) -> None:

@@ -39,14 +39,14 @@ class SensorReader:
         name = f"{character.setup.prefix}{sensor.name}"
         self._noise = {
             quantity: NoiseSource(noise, settings.seed, f"{name}.{quantity}", settings.tick_s)
-            for quantity, noise in self._own_noise().items()
+            for quantity, noise in self._noise_in_force().items()
         }
 
     def read(self, tick: int) -> FloatArray | None:
         """All doubles of the sensor's message at a tick; None if it has nothing to say."""
         raise NotImplementedError
 
-    def _own_noise(self) -> dict[str, Noise]:
+    def _noise_in_force(self) -> dict[str, Noise]:
         """The noise of each quantity: the sensor's own, white noise as the settings have it."""
         noise = dict(self._sensor.noise)
         for quantity, deviation in self._settings.deviations().items():
@@ -80,7 +80,7 @@ class ImuReader(SensorReader):
         super().__init__(character, sensor, settings)
         self._doubles = np.zeros(_IMU_DOUBLES)
         for quantity, start in _COVARIANCES.items():
-            deviations = np.array(self._own_noise().get(quantity, Noise()).stddev)
+            deviations = np.array(self._noise_in_force().get(quantity, Noise()).stddev)
             self._doubles[start : start + 9 : _DIAGONAL] = deviations * deviations
         self._last: tuple[StampedState | None, FrameMotion] = (None, AT_REST)
         self._first_variance = self._doubles[_COVARIANCES["linear_acceleration"]]

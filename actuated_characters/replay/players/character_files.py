@@ -1,15 +1,18 @@
 """A recorded character as files again, for nodes that load it by its path."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from controller_node.ground import NO_FILE, TERRAIN
 from msgs_config import files
 from msgs_config.character.file import ALONE
 from msgs_config.character.layout import JointType
 from msgs_config.character.meshes.resolving import resolve_meshes
 from msgs_config.character.model import Character, UrdfOptions
 from msgs_config.errors import CharacterError
+from msgs_config.shared_parameters import PLANE
 
 _NO_LIMIT = 1e300  # N m or N; a file cannot say infinity
 
@@ -43,6 +46,29 @@ def write_urdf(file: Path, loading: UrdfOptions) -> Path:
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(ElementTree.tostring(robot, encoding="utf-8"))
     return file
+
+
+def write_terrain(directory: Path, terrain: UrdfOptions | None) -> dict[str, str]:
+    """The parameter of a node that has a recorded terrain from a file; none without terrain.
+
+    Raises:
+        CharacterError: a mesh does not exist any more.
+    """
+    if terrain is None:
+        return {}
+    return {TERRAIN.name: str(write_urdf(directory / "terrain.urdf", terrain))}
+
+
+def known_terrain(
+    directory: Path, terrain: UrdfOptions | None, parameters: Mapping[str, object]
+) -> dict[str, str]:
+    """The same for a controller, which may know none: by its recorded parameters.
+
+    Raises:
+        CharacterError: a mesh does not exist any more.
+    """
+    knows = parameters.get(TERRAIN.name, PLANE) not in NO_FILE
+    return write_terrain(directory, terrain) if knows else {}
 
 
 def _content(character: Character) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 from actuated_characters.bags.node_parameters import NodeParameters
 from actuated_characters.bags.recording import Recording
 from controller_node.files_read import files_read
+from controller_node.ground import TERRAIN
 from controller_node.parameters import resolve_for
 from msgs_config.digests import sha256_of
 from msgs_config.errors import RecordingError
@@ -30,7 +31,7 @@ def first_parameters(recording: Recording) -> dict[str, Any]:
 def changed_files(recording: Recording) -> list[str]:
     """A sentence for each file of a recording's controller that is not what it was.
 
-    A file that is not there is left to who reads it.
+    A file that is not there is left to who reads it; a terrain is taken from the recording.
 
     Raises:
         RecordingError: the bag does not have the controller's parameters.
@@ -40,7 +41,7 @@ def changed_files(recording: Recording) -> list[str]:
     sentences = []
     for name, path in files_read(recording.character, values).items():
         with suppress(OSError):
-            if settings.files.get(name, "") not in ("", sha256_of(path)):
+            if name != TERRAIN.name and settings.files.get(name, "") not in ("", sha256_of(path)):
                 sentences.append(f"{path} is not the file that it was: its content differs")
     return sentences
 

@@ -283,7 +283,7 @@ class StandardServices:
             raise RefusedRequestError(
                 WorldCode.UNSUPPORTED_FORMAT,
                 f"the world is {self._own.terrain!r} while this node runs; another one is the "
-                f"parameter 'terrain' of its start: {PLANE}, {NO_GROUND} or a terrain",
+                f"parameter 'terrain' of its start: {PLANE}, {NO_GROUND}, a shipped one, or a path",
             )
         self._stop()
         response.world.name = response.world.world_resource.uri = uri

@@ -80,7 +80,7 @@ def test_a_pushed_fall_comes_again(tmp_path: Path, own_handlers: None) -> None:
 
 @pytest.mark.parametrize(
     "given",
-    [{}, {"command_delay_ticks": 3, "substeps": 2, "mass_factors": ["*:1.2", "chest:1.5"]}],
+    [{}, {"command_delay_ticks": 3, "substeps": 2, "mass_factors": ["all:1.2", "chest:1.5"]}],
     ids=str,
 )
 def test_two_resets_a_pause_and_clipped_torques_come_again(

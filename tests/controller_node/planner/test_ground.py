@@ -193,6 +193,7 @@ def test_what_is_felt_needs_contacts() -> None:
             "knows the ground at z = 0 alone; it must be plane",
         ),
         ({"terrain": "a.yaml"}, "a.yaml: No such file"),
+        ({"planner": "policy", "terrain": "stairs"}, "z = 0 alone; it must be plane"),
         ({"terrain": FELT, "command_delay_ticks": 1}, "'command_delay_ticks' is 1; it must be 0"),
         ({"terrain": FELT, "plan.contact": "world"}, "'plan.contact' is world; it must be own"),
         (

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+import actuated_characters as ac
+from actuated_characters.runs.plan import make_plan
 from controller_node.model_check import check_agreement
 from msgs_config.character.dynamics import DynamicsModel
+from msgs_config.character.loading import load_character
 from msgs_config.errors import ConfigurationError
 from sim_node.parameters import load_parameters
 from sim_node.physics.mass_factors import with_mass_factors
@@ -28,7 +31,7 @@ GRAVITY = 9.81
 def test_engine_and_model_agree_on_each_character(name: str) -> None:
     whole = character(name)
     names = [link.name for link in whole.links if link.mass]
-    factors = ["*:1.3", *(f"{each}:{0.6 + 0.2 * (row % 5)}" for row, each in enumerate(names))]
+    factors = ["all:1.3", *(f"{each}:{0.6 + 0.2 * (row % 5)}" for row, each in enumerate(names))]
     heavy = with_mass_factors(whole, factors)
 
     check_agreement(DynamicsModel(heavy, GRAVITY), heavy.layout, measure_probe(heavy, GRAVITY))
@@ -36,7 +39,7 @@ def test_engine_and_model_agree_on_each_character(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factors", "share"), [([], 1.0), (["box:2"], 0.5), (["*:2", "box:2"], 0.25)]
+    ("factors", "share"), [([], 1.0), (["box:2"], 0.5), (["all:2", "box:2"], 0.25)]
 )
 def test_a_push_and_a_twist_accelerate_by_mass_and_inertia(
     factors: list[str], share: float
@@ -58,10 +61,11 @@ def test_a_push_and_a_twist_accelerate_by_mass_and_inertia(
     [
         (
             "chest:0",
-            "parameter 'mass_factors' has 'chest:0'; it must be LINK:NUMBER, the number 0.001",
+            "parameter 'mass_factors' has 'chest:0'; it must be LINK:NUMBER, the number 0.01",
         ),
         ("chest", "'mass_factors' has 'chest'; it must be LINK:NUMBER"),
         ("chest:nan", "'mass_factors' has 'chest:nan'; it must be LINK:NUMBER"),
+        ("chest:1e3", "must be LINK:NUMBER, the number 0.01 to 100"),
         ("chess:2", "'mass_factors' has 'chess:2': unknown link 'chess'; did you mean 'chest'"),
     ],
 )
@@ -70,3 +74,23 @@ def test_what_is_wrong_is_one_line(factor: str, sentence: str) -> None:
         load_parameters({"mass_factors": [factor]})
 
     assert sentence in str(caught.value)
+
+
+def test_a_link_without_mass_has_no_factor() -> None:
+    with pytest.raises(ConfigurationError, match="unknown link 'pivot'; there are: all, rod"):
+        with_mass_factors(character("pendulum"), ["pivot:2"])
+
+
+def test_a_snapshot_is_not_of_other_masses() -> None:
+    pendulum = load_character("pendulum")
+    with (
+        ac.Simulation(pendulum, mass_factors=["rod:2"]) as heavy,
+        ac.Simulation(pendulum) as light,
+        pytest.raises(ConfigurationError, match="both must be the same"),
+    ):
+        light.restore(heavy.snapshot())
+
+
+def test_a_plan_has_them_checked() -> None:
+    with pytest.raises(ConfigurationError, match="unknown link 'rdo'; did you mean 'rod'"):
+        make_plan("pendulum", 0.1, {}, {"mass_factors": ["rdo:2"]}, {})

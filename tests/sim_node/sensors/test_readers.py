@@ -58,6 +58,12 @@ def read(run: LoneSimulation, sensor: SensorReader) -> FloatArray:
     return values.copy()
 
 
+def read_at(sensor: SensorReader, tick: int) -> FloatArray:
+    values = sensor.read(tick)
+    assert values is not None
+    return values.copy()
+
+
 def orientation(values: FloatArray) -> FloatArray:
     return values[0:4]
 
@@ -314,17 +320,20 @@ def test_settings_have_white_noise_in_place_of_the_sensors_own() -> None:
     sensor = imu("chest", POSE, angular_velocity=own, orientation=Noise(stddev=(0.01,) * 3))
     noisy = reader(run, sensor, settings)
 
-    rates = []
-    for tick in range(1, 2001):
-        values = noisy.read(tick)
-        assert values is not None
-        rates.append(rate(values).copy())
+    rates = [rate(read_at(noisy, tick)) for tick in range(1, 2001)]
 
     assert np.std(rates, axis=0) == pytest.approx([0.5] * 3, rel=0.07)
     assert np.mean(rates, axis=0) == pytest.approx([5.0, 0.0, 0.0], abs=0.05)
     values = read(run, noisy)
     assert values[16:25].reshape(3, 3) == pytest.approx(0.25 * np.eye(3))
     assert values[4:13].reshape(3, 3) == pytest.approx(1e-4 * np.eye(3))
+
+    sole = reader(run, force_sensor("left_ankle", force=Noise(bias=(0.0, 0.0, 1e4))), settings)
+    run.watches_contacts = True
+    run.advance(np.zeros(run.layout.size))
+    readings = [read_at(sole, tick) for tick in range(1, 2001)]
+    assert np.std(readings, axis=0) == pytest.approx([2.0] * 3 + [0.0] * 3, rel=0.07, abs=1e-9)
+    assert np.mean(readings, axis=0)[2] > 9e3
 
 
 @pytest.mark.parametrize(
@@ -333,11 +342,12 @@ def test_settings_have_white_noise_in_place_of_the_sensors_own() -> None:
         ("speed:1", "'sensor_noise' has 'speed:1': unknown quantity 'speed'; there are: orient"),
         ("force:-1", "'sensor_noise' has 'force:-1'; it must be QUANTITY:NUMBER, the number 0 to"),
         ("force", "'sensor_noise' has 'force'; it must be QUANTITY:NUMBER"),
+        ("force:1,force:2", "'sensor_noise' has 'force' twice; give it once"),
     ],
 )
 def test_noise_of_what_no_sensor_measures_is_one_line(noise: str, sentence: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
-        load_parameters({"sensor_noise": [noise]})
+        load_parameters({"sensor_noise": noise.split(",")})
 
     assert sentence in str(caught.value)
 
