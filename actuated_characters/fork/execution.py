@@ -12,8 +12,8 @@ from actuated_characters.fork.plan import ForkPlan
 from actuated_characters.fork.script import Script
 from actuated_characters.recorder.run_directory import PARAMETERS
 from actuated_characters.replay.players.character_files import (
-    known_terrain,
     write_character,
+    write_known_terrain,
     write_terrain,
 )
 from actuated_characters.runs.execution import run_over_topics
@@ -67,7 +67,7 @@ def with_files(plan: RunPlan, recording: Recording, folder: Path) -> RunPlan:
     if not _is_unchanged(recording):
         both[CHARACTER.name] = str(write_character(folder, recording.character))
     simulator = both | write_terrain(folder, terrain)
-    controller = both | known_terrain(folder, terrain, plan.controller)
+    controller = both | write_known_terrain(folder, terrain, plan.controller)
     for given, raw, name in (
         (simulator, recording.keyframe, topics.SIM_NODE),
         (controller, recording.controller_keyframe, topics.CONTROLLER_NODE),

@@ -10,8 +10,8 @@ from actuated_characters.bags.recording import Recording, read_recording
 from actuated_characters.replay.command_comparison import CommandComparison, compare_commands
 from actuated_characters.replay.comparison import QUANTITIES, ReplayResult, States, compare_world
 from actuated_characters.replay.players.character_files import (
-    known_terrain,
     write_character,
+    write_known_terrain,
     write_terrain,
 )
 from actuated_characters.replay.players.controller_parameters import first_parameters
@@ -228,5 +228,5 @@ def _controller_parameters(directory: Path, recording: Recording) -> dict[str, o
         ),
     }
     parameters = first_parameters(recording)
-    own_files |= known_terrain(directory, recording.world.terrain, parameters)
+    own_files |= write_known_terrain(directory, recording.world.terrain, parameters)
     return parameters | own_files | {"wait_for_subscribers": 1}

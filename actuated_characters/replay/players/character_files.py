@@ -59,7 +59,7 @@ def write_terrain(directory: Path, terrain: UrdfOptions | None) -> dict[str, str
     return {TERRAIN.name: str(write_urdf(directory / "terrain.urdf", terrain))}
 
 
-def known_terrain(
+def write_known_terrain(
     directory: Path, terrain: UrdfOptions | None, parameters: Mapping[str, object]
 ) -> dict[str, str]:
     """The same for a controller, which may know none: by its recorded parameters.
