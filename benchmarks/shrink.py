@@ -53,8 +53,9 @@ def main() -> None:
         plan = _base(base)
         for number in range(options.first, options.first + options.runs):
             rng = np.random.default_rng((options.seed, number))
-            _draw_failure(base, plan, rng, Path(folder) / "run")
-            row = _shrink(Path(folder) / "run", Path(folder))
+            own = Path(folder) / str(number)
+            _draw_failure(base, plan, rng, own / "run")
+            row = _shrink(own / "run", own)
             print(number, *row, sep=" | ", flush=True)
             table.add_row(str(number), *row)
     Console(width=180).print(table)
