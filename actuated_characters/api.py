@@ -30,7 +30,7 @@ from msgs_config.parameters import Values
 from msgs_config.plain_values import finite_numbers, plain_parameters
 from msgs_config.shared_parameters import placed
 from sim_node import parameters as simulator_parameters
-from sim_node.initial_state import CharacterSettings, as_values
+from sim_node.initial_state import as_values
 from sim_node.node_settings import NodeSettings
 from sim_node.physics import simulation
 from sim_node.physics.settings import SimulationSettings
@@ -142,7 +142,7 @@ class Controller:
 class SimulationSnapshot:
     """A state of a `Simulation` and all that follows from it; it can be pickled."""
 
-    character: tuple[str, ...]  # its file's name, its degrees of freedom, its `mass_factors`
+    character: tuple[str, ...]  # its file's name, and those of its degrees of freedom
     world: simulation.Snapshot
     first_tick: int  # number of the episode's first tick
     pushes: tuple[ExternalWrench, ...]  # pushes that wait for their time, or still act
@@ -328,11 +328,11 @@ class Simulation:
         return self.state
 
     @property
-    def _kind(self) -> tuple[tuple[str, ...], SimulationSettings]:
+    def _kind(self) -> tuple[tuple[str, ...], SimulationSettings, tuple[str, ...]]:
         """What another simulation's snapshot must have in common with this one."""
-        factors = CharacterSettings.of(self._values).mass_factors
-        own = (self.character.file.name, *self.character.layout.dof_names, *factors)
-        return own, self.settings
+        (own,) = self._simulation.characters
+        names = (self.character.file.name, *self.character.layout.dof_names)
+        return names, self.settings, own.setup.mass_factors
 
     def snapshot(self) -> SimulationSnapshot:
         """The present state and all that follows from it, for `restore`; takes 0.3 ms."""
@@ -354,7 +354,8 @@ class Simulation:
         Raises:
             ConfigurationError: it is of another character, or other parameters.
         """
-        if self._kind != (snapshot.character, snapshot.world.settings):
+        world = snapshot.world
+        if self._kind != (snapshot.character, world.settings, world.characters[0].mass_factors):
             raise ConfigurationError(
                 f"the snapshot is of a simulation of {snapshot.character[0]} with its parameters, "
                 f"this is one of {self.character.file.name}; both must be the same"
