@@ -133,16 +133,26 @@ class _Counter(pickle.Pickler):
 
     def reducer_override(self, each: object) -> Any:
         """Leave out what was computed once it was asked for: it is not there from the start."""
-        cached = [name for name in getattr(each, "__dict__", ()) if _is_cached(each, name)]
-        if isinstance(each, type) or not cached:
+        if isinstance(each, type):
+            return NotImplemented
+        kind: Any = type(each)
+        cached = _cached_properties(kind).intersection(getattr(each, "__dict__", ()))
+        if not cached:
             return NotImplemented
         reduced: Any = each.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
         made, given, state = reduced[:3]
         return made, given, {name: state[name] for name in state if name not in cached}
 
 
-def _is_cached(owner: object, name: str) -> bool:
-    return isinstance(inspect.getattr_static(type(owner), name, None), cached_property)
+@cache
+def _cached_properties(kind: type) -> frozenset[str]:
+    """The names under which objects of a class keep what they were asked for once."""
+    names = {name for each in kind.__mro__ for name in vars(each)}
+    return frozenset(
+        name
+        for name in names
+        if isinstance(inspect.getattr_static(kind, name, None), cached_property)
+    )
 
 
 class _Writer(pickle.Pickler):
