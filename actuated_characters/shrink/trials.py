@@ -1,7 +1,7 @@
 """The trials of a shrinking: each choice once, from what it has in common with others on."""
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,13 @@ from actuated_characters.shrink.inputs import Event
 from actuated_characters.shrink.minimal import Sizes, shrunk
 from actuated_characters.shrink.shrinking import Shrinking
 from actuated_characters.shrink.trial import TrialSetting, run_trial
-from msgs_config.errors import ConfigurationError, RefusedError, RunError, SimulationError
+from msgs_config.errors import (
+    ActuatedCharactersError,
+    ConfigurationError,
+    RefusedError,
+    RunError,
+    SimulationError,
+)
 from msgs_config.runtime.worker_processes import WorkerProcesses
 
 _Sent: TypeAlias = tuple[str, ...]  # the events before a state, as texts: lists have no hash
@@ -37,8 +43,9 @@ class Trials:
     setting: TrialSetting = field(init=False)
     _pool: WorkerProcesses | None = None
     _at_once: int = 1
-    _begun: dict[_Sent, Future[Ended]] = field(default_factory=dict)
+    _begun: dict[_Sent, tuple[Sizes, Future[Ended]]] = field(default_factory=dict)
     _fell: dict[_Sent, bool] = field(default_factory=dict)
+    _failed: dict[_Sent, ActuatedCharactersError] = field(default_factory=dict)
     _keyframes: dict[tuple[int, _Sent], Keyframe] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -89,45 +96,66 @@ class Trials:
             ActuatedCharactersError: something else went wrong.
         """
         for number, sizes in enumerate(choices):
-            self._begin(choices[number:])
-            if self._falls(sizes):
+            if self._falls(sizes, choices[number + 1 :]):
                 return number
         return None
 
-    def _falls(self, sizes: Sizes) -> bool:
+    def _falls(self, sizes: Sizes, later: Sequence[Sizes]) -> bool:
+        """Whether a choice falls; meanwhile `later` ones are tried, should this one not."""
         key = _texts(self.shrinking.events(sizes))
-        if key not in self._fell:
-            try:
-                self._learn(sizes, self._ended(sizes))
-            except (RefusedError, SimulationError):
-                self._fell[key] = False
+        while key not in self._fell:
+            if key in self._failed:
+                raise self._failed[key]
+            if self._pool is None:
+                self._try(sizes)
+            else:
+                self._try_together(self._pool, [sizes, *later])
         self._keep_best(sizes, self._fell[key])
         return self._fell[key]
 
-    def _ended(self, sizes: Sizes) -> Ended:
+    def _try(self, sizes: Sizes) -> None:
         events = self.shrinking.events(sizes)
-        if self._pool is None:
-            self._count()
-            return run_trial(self.setting, events, self._latest_keyframe(events))
+        self._count()
+        self._learn_of(sizes, lambda: run_trial(self.setting, events, self._latest(events)))
+
+    def _try_together(self, pool: WorkerProcesses, choices: Sequence[Sizes]) -> None:
+        """Begin the first choice, and others where there is room; learn of those that end next."""
         try:
-            return self._begun.pop(_texts(events)).result()
+            self._begin(pool, choices)
+            wait([future for _, future in self._begun.values()], return_when=FIRST_COMPLETED)
+            for key in [key for key, (_, future) in self._begun.items() if future.done()]:
+                sizes, future = self._begun.pop(key)
+                self._learn_of(sizes, future.result)
         except BrokenProcessPool as error:
             raise RunError("a process that tries inputs was killed; begin again") from error
 
-    def _begin(self, choices: Sequence[Sizes]) -> None:
-        """Begin the first of some choices, of which nothing is known, where there is room."""
-        for sizes in choices if self._pool is not None else ():
+    def _begin(self, pool: WorkerProcesses, choices: Sequence[Sizes]) -> None:
+        """Begin what is not known of some choices, up to one that is known to fall."""
+        for number, sizes in enumerate(choices):
             events = self.shrinking.events(sizes)
             key = _texts(events)
-            if key in self._fell or key in self._begun:
-                continue
-            at_work = sum(not each.done() for each in self._begun.values())
-            if at_work >= self._at_once and sizes is not choices[0]:
+            if self._fell.get(key):
                 return
-            assert self._pool is not None
+            if key in self._fell or key in self._failed or key in self._begun:
+                continue
+            if number and len(self._begun) >= self._at_once:
+                return
             self._count()
-            begin = self._latest_keyframe(events)
-            self._begun[key] = self._pool.submit(_Worker.run, tuple(events), begin)
+            future = pool.submit(_Worker.run, tuple(events), self._latest(events))
+            self._begun[key] = sizes, future
+
+    def _learn_of(self, sizes: Sizes, ended: Callable[[], Ended]) -> None:
+        """Learn of a choice; one that a node refuses, or that diverges, does not fall.
+
+        What else goes wrong counts where the choice is asked for.
+        """
+        key = _texts(self.shrinking.events(sizes))
+        try:
+            self._learn(sizes, ended())
+        except (RefusedError, SimulationError):
+            self._fell[key] = False
+        except ActuatedCharactersError as error:
+            self._failed[key] = error
 
     def _count(self) -> None:
         self.count += 1
@@ -148,7 +176,7 @@ class Trials:
         if falls and (self.best is None or _cost(sizes) < _cost(self.best)):
             self.best = dict(sizes)
 
-    def _latest_keyframe(self, events: Sequence[Event]) -> Keyframe | None:
+    def _latest(self, events: Sequence[Event]) -> Keyframe | None:
         """The last keyframe of a run that was sent the same before."""
         rows = sorted({row for row, _ in self._keyframes}, reverse=True)
         return next(
