@@ -7,7 +7,9 @@ as a small ball, where that cannot change an inertia.
 
 import math
 import os
+import re
 import warnings
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +26,7 @@ SUFFIXES = (".xml", ".mjcf")
 _ROOT = "mujoco"
 _STAND_IN = 1e-3  # m, the radius of the ball in the place of a mesh that is missing
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
+_OTHERS = re.compile(r"""<(?:include|model)\s[^>]*?\bfile\s*=\s*["']([^"']+)""")
 _HEIGHTS = mujoco.mjtGeom.mjGEOM_HFIELD
 
 
@@ -41,6 +44,17 @@ class CompiledMjcf(NamedTuple):
     def name(self, kind: str, number: int) -> str:
         """The name of a thing of a kind such as `body`; one without a name gets its number."""
         return str(getattr(self.model, kind)(number).name) or f"{kind}_{number}"
+
+    def mesh_file(self, number: int) -> str:
+        """The file of a mesh as a URDF beside the MJCF names it; empty for one without a file.
+
+        That of an attached model is where MuJoCo found it: beside that model's own file.
+        """
+        begin = int(self.model.mesh_pathadr[number])
+        if begin < 0:
+            return ""
+        file = self.model.paths[begin:].split(b"\0", 1)[0].decode()
+        return os.path.relpath(file, self.path.parent)
 
 
 def is_mjcf(path: Path) -> bool:
@@ -81,7 +95,7 @@ def _compile(path: Path, refused: str = "") -> CompiledMjcf:
         warnings.simplefilter("ignore")
         try:
             spec = mujoco.MjSpec.from_file(str(path))
-            remarks = _take_away_pictures(spec)
+            remarks = [*_take_away_pictures(spec), *_take_away_heights(spec)]
             if refused:
                 remarks.append(_take_away_references(spec, refused))
             balls = _replace_missing(path, spec)
@@ -98,14 +112,22 @@ def _take_away_references(spec: mujoco.MjSpec, reason: str) -> LeftOut:
     return LeftOut("refused", f"left out: all <sensor>, <pair> and <exclude>: {reason}")
 
 
-def mesh_name(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> str:
-    """A mesh's file as a URDF beside the MJCF names it; empty for one without a file."""
-    return os.path.relpath(_mesh_path(path, spec, mesh), path.parent) if mesh.file else ""
-
-
-def _mesh_path(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> Path:
+def _mesh_path(folders: Sequence[Path], spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> Path:
+    """Where a mesh is; beside the first of the files if it is missing."""
     name = Path(mesh.file).name if spec.strippath else mesh.file
-    return path.parent / (mesh.compiler.meshdir or spec.compiler.meshdir or "") / name
+    place = Path(mesh.compiler.meshdir or spec.compiler.meshdir or "", name)
+    found = (folder / place for folder in folders if _is_there(folder / place))
+    return next(found, folders[0] / place)
+
+
+def _folders(path: Path, seen: set[Path]) -> Iterator[Path]:
+    """The folders of a file, and of all that it includes or attaches: meshes may lie in each."""
+    if path in seen or not path.is_file():
+        return
+    seen.add(path)
+    yield path.parent
+    for name in _OTHERS.findall(path.read_text(errors="replace")):
+        yield from _folders(path.parent / name, seen)
 
 
 def _take_away_pictures(spec: mujoco.MjSpec) -> list[LeftOut]:
@@ -125,35 +147,46 @@ def _take_away_pictures(spec: mujoco.MjSpec) -> list[LeftOut]:
     return remarks
 
 
-def _replace_missing(path: Path, spec: mujoco.MjSpec) -> list[tuple[mujoco.MjsGeom, str]]:
-    """Replace shapes by balls where their files are missing; each with the mesh that it had."""
-    missing = {each.name: each for each in spec.meshes if _is_missing(path, spec, each)}
-    balls = []
+def _take_away_heights(spec: mujoco.MjSpec) -> list[LeftOut]:
+    """Remove fields of heights, whose files may be missing; their geoms become balls."""
+    names = [each.name for each in spec.hfields]
     for geom in spec.geoms:
         if geom.type == _HEIGHTS:
             _make_ball(geom)
-        elif geom.meshname in missing:
+    for each in list(spec.hfields):
+        spec.delete(each)
+    return [LeftOut("hfield", f"left out: <hfield> ({len(names)}){_named(names)}")] if names else []
+
+
+def _replace_missing(path: Path, spec: mujoco.MjSpec) -> list[tuple[mujoco.MjsGeom, str]]:
+    """Replace shapes by balls where their files are missing; each with the mesh that it had."""
+    folders = list(_folders(path, set()))
+    missing = {
+        each.name: each
+        for each in spec.meshes
+        if each.file and not _is_there(_mesh_path(folders, spec, each))
+    }
+    balls = []
+    for geom in spec.geoms:
+        if geom.meshname in missing:
             mesh = missing[geom.meshname]
             if _weighs(spec, geom):
                 raise CharacterError(
                     f"{path}: body '{geom.parent.name}' has the inertia of a mesh that is missing: "
-                    f"{_mesh_path(path, spec, mesh)}"
+                    f"{_mesh_path(folders, spec, mesh)}"
                 )
-            balls.append((geom, mesh_name(path, spec, mesh)))
+            balls.append((geom, os.path.relpath(_mesh_path(folders, spec, mesh), path.parent)))
             _make_ball(geom)
-    for each in (*missing.values(), *spec.hfields):
+    for each in missing.values():
         spec.delete(each)
     return balls
 
 
-def _is_missing(path: Path, spec: mujoco.MjSpec, mesh: mujoco.MjsMesh) -> bool:
-    if not mesh.file:
-        return False
-    file = _mesh_path(path, spec, mesh)
+def _is_there(file: Path) -> bool:
     try:
-        return not file.is_file() or files.is_lfs_pointer(file)
+        return file.is_file() and not files.is_lfs_pointer(file)
     except OSError:
-        return True
+        return False
 
 
 def _weighs(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> bool:

@@ -24,12 +24,12 @@ _PLURALS = {
     "camera": "cameras",
     "light": "lights",
     "flex": "flexes",
-    "hfield": "hfields",
     "plugin": "plugins",
     "numeric": "numerics",
     "text": "texts",
     "tuple": "tuples",
 }
+_SOLVER = (0.02, 1.0, 0.9, 0.95, 0.001, 0.5, 2.0)  # MuJoCo's own solref and solimp
 _OF_PICTURES = ("visual", "statistic", "size")
 
 
@@ -51,8 +51,11 @@ def remark_joints(mjcf: CompiledMjcf, robot: Robot) -> Iterator[LeftOut]:
         if is_ball and model.dof_frictionloss[dof]:
             add("frictionloss of a ball joint", name)
         limit = (*model.jnt_solref[joint], *model.jnt_solimp[joint])
-        if model.jnt_limited[joint] and not np.allclose(limit, (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)):
+        if model.jnt_limited[joint] and not np.allclose(limit, _SOLVER):
             add("solreflimit and solimplimit", name)
+        friction = (*model.dof_solref[dof], *model.dof_solimp[dof])
+        if model.dof_frictionloss[dof] and not np.allclose(friction, _SOLVER):
+            add("solreffriction and solimpfriction", name)
         if np.any(model.jnt_margin[joint]):
             add("margin of a joint's range", name)
     for body in robot.bodies:

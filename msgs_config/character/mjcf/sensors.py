@@ -13,7 +13,7 @@ import numpy as np
 from msgs_config.character.mjcf.compiling import CompiledMjcf
 from msgs_config.character.mjcf.places import anchor, turn_of
 from msgs_config.character.mjcf.robot import Robot
-from msgs_config.character.mjcf.shapes import collides
+from msgs_config.character.mjcf.shapes import is_touched
 from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
 from msgs_config.geometry import rotations
 
@@ -87,7 +87,7 @@ def _kind(mjcf: CompiledMjcf, robot: Robot, sensor: int) -> str:
     if model.sensor_type[sensor] in _IMU:
         return "imu"
     geoms = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) == body]
-    touched = body and any(collides(model, geom) for geom in geoms)
+    touched = body and any(is_touched(mjcf, geom) for geom in geoms)
     return "force" if model.sensor_type[sensor] in _FORCE and touched else ""
 
 

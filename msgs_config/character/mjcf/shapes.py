@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from msgs_config.arrays import FloatArray
-from msgs_config.character.mjcf.compiling import CompiledMjcf, mesh_name
+from msgs_config.character.mjcf.compiling import CompiledMjcf
 from msgs_config.character.mjcf.places import anchor, turn_of
 from msgs_config.character.mjcf.robot import Robot
 from msgs_config.character.urdf.file_formats.vocabulary import LeftOut, listed
@@ -52,6 +52,11 @@ def collides(model: mujoco.MjModel, geom: int) -> bool:
         own[0] & int(model.geom_conaffinity[g]) or own[1] & int(model.geom_contype[g])
         for g in ground
     )
+
+
+def is_touched(mjcf: CompiledMjcf, geom: int) -> bool:
+    """Whether a geom is a shape of its link that collides."""
+    return collides(mjcf.model, geom) and _geometry(mjcf, geom) is not None
 
 
 def remark_shapes(mjcf: CompiledMjcf, robot: Robot) -> Iterator[LeftOut]:
@@ -136,7 +141,7 @@ def _mesh(
     mesh = next(each for each in mjcf.spec.meshes if each.id == number)
     scale, ref_turn = np.array(mesh.scale), rotations.normalised(turn_of(mesh.refquat))
     is_turned = bool(np.abs(ref_turn[:3]).any())
-    name = mesh_name(mjcf.path, mjcf.spec, mesh)
+    name = mjcf.mesh_file(number)
     if not name.lower().endswith(_MESHES) or (is_turned and np.ptp(scale) > 0.0):
         return None
     turn = rotations.multiply(turn, rotations.conjugate(turn_of(model.mesh_quat[number])))

@@ -80,6 +80,7 @@ LOST = {
     "<key> (1): k": '<keyframe><key name="k"/></keyframe>',
     "<numeric> (1): n": '<custom><numeric name="n" data="1"/></custom>',
     "<visual>": "<visual><global/></visual>",
+    "<hfield> (1): f": '<asset><hfield name="f" nrow="2" ncol="2" size="1 1 1 1"/></asset>',
     "gravity, integrator": '<option gravity="0 0 -1" integrator="RK4"/>',
 }
 
@@ -96,6 +97,10 @@ def test_what_no_character_has_is_said(tmp_path: Path, line: str, element: str) 
 
 JOINTS = {
     "stiffness (1): h": ('<joint name="h" stiffness="2"/>', ""),
+    "solreffriction and solimpfriction (1): h": (
+        '<joint name="h" frictionloss="1" solreffriction="0.1 1"/>',
+        "",
+    ),
     "range of a ball joint (1): b": ('<joint name="b" type="ball" range="0 1"/>', ""),
     "gravcomp (1): arm": ('<joint name="h"/>', 'gravcomp="1"'),
     "contact parameters of geoms": ('<joint name="h"/><geom size="1" friction="0.1"/>', ""),

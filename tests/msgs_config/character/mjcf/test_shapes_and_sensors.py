@@ -89,6 +89,24 @@ def test_a_mesh_is_where_mujoco_has_its_vertices(tmp_path: Path, attributes: str
         assert np.abs(own - vertex).max(axis=1).min() < 1e-6
 
 
+@pytest.mark.parametrize("rest", ["", '<sensor><touch site="of_a_scene"/></sensor>'])
+def test_a_mesh_of_a_model_that_is_attached_is_beside_its_own_file(
+    tmp_path: Path, rest: str
+) -> None:
+    part, whole = tmp_path / "part", tmp_path / "whole"
+    (part / "meshes").mkdir(parents=True)
+    whole.mkdir()
+    (part / "meshes" / "wedge.obj").write_text(WEDGE)
+    assets = '<asset><mesh name="m" file="meshes/wedge.obj"/></asset>'
+    write_mjcf(part, arm(HINGE, '<geom type="mesh" mesh="m"/>'), assets)
+    attached = '<asset><model name="part" file="../part/robot.xml"/></asset>'
+    path = write_mjcf(whole, '<attach model="part" body="arm" prefix="a_"/>', attached + rest)
+
+    (shape,) = load_character(path).links[-1].collision_shapes
+
+    assert Path(shape.mesh).resolve() == part / "meshes" / "wedge.obj"
+
+
 def test_groups_and_bits_say_what_is_seen_and_what_collides(tmp_path: Path) -> None:
     geoms = (
         '<geom size="0.1" contype="0" conaffinity="0" rgba="1 0 0 1"/>'
@@ -160,6 +178,16 @@ def test_sensors_at_a_site_are_an_imu_in_its_place(tmp_path: Path) -> None:
     assert imu.noise["angular_velocity"].stddev == (0.01,) * 3
     assert (force.type, force.name, force.link) == (SensorType.FORCE, "sole", "arm")
     assert "left out: sensors (1): v" in character.warnings
+
+
+def test_what_touches_a_body_without_shapes_is_not_felt(tmp_path: Path) -> None:
+    geom = '<geom type="ellipsoid" size="0.1 0.1 0.2"/><site name="sole"/>'
+    sensors = '<sensor><touch name="t" site="sole"/></sensor>'
+
+    character = load_mjcf(tmp_path, arm(HINGE, geom), sensors)
+
+    assert character.sensors == ()
+    assert "left out: sensors (1): t" in character.warnings
 
 
 def test_the_tree_that_moves_most_is_the_character(tmp_path: Path) -> None:
