@@ -183,6 +183,7 @@ def test_a_mistake_is_one_clear_line(wrong, words, pendulum) -> None:  # type: i
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_over_topics_has_the_hash_of_the_lines_of_the_api(tmp_path: Path) -> None:
     metrics = ac.run("pendulum", 0.5, output=tmp_path / "run", controller=SWINGING)

@@ -71,6 +71,7 @@ def test_what_follows_a_state_is_what_followed_it_to_the_bit(case: str, steps: i
     environment.close()
 
 
+@pytest.mark.slow
 def test_another_process_goes_on_to_the_bit() -> None:
     environment = TrackEnv(**WALK)
     environment.reset(seed=4)
@@ -216,6 +217,7 @@ def test_gymnasiums_wrappers_collect_the_pictures() -> None:
 # Several processes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("context", ["fork", "spawn"])
 def test_environments_in_processes_of_their_own_are_those_of_one(context: str) -> None:
     def rows(**how: Any) -> tuple[list[FloatArray], Any]:

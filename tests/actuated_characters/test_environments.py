@@ -58,6 +58,7 @@ def hash_of_run(ticks: int, **controller: object) -> str:
     return states.hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

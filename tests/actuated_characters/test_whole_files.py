@@ -142,6 +142,7 @@ def test_what_a_killed_run_has_left_of_a_file_is_overwritten(tmp_path: Path) -> 
 # The command
 
 
+@pytest.mark.slow
 def test_a_run_on_a_full_disk_ends_with_the_file_and_the_reason(
     processes: Processes, tmp_path: Path
 ) -> None:

@@ -261,6 +261,7 @@ def test_a_jump_flies_for_a_quarter_of_a_second_and_stands(kind: str) -> None:
     assert isinstance(facts["flight, s"], float) and FLIGHT < facts["flight, s"] < 0.5
 
 
+@pytest.mark.slow
 def test_what_has_no_flight_is_no_jump() -> None:
     facts = measure_jump(see(machine_case("stands", 4.0, "walk")))
 
@@ -278,6 +279,7 @@ def test_nudges_of_a_run_are_small_and_one_in_each_four_seconds() -> None:
         assert 10.0 <= math.hypot(x, y) <= 30.0 and z == 0.0
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_has_flights_at_the_speed_that_it_is_told() -> None:
     (case,) = run_cases("nudged", Options(runs=1, seconds=4.0))
@@ -290,6 +292,7 @@ def test_a_run_has_flights_at_the_speed_that_it_is_told() -> None:
     assert measure_run(see(stop))["succeeded"]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_walk_is_no_run() -> None:
     (case,) = run_cases("nudged", Options(runs=1, seconds=2.0, machine="walk"))

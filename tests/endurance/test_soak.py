@@ -13,6 +13,7 @@ from tests.endurance import soak_report
 from tests.endurance.soak import soak
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
     domain: int, monkeypatch: pytest.MonkeyPatch
@@ -33,6 +34,7 @@ def test_no_tick_is_lost_and_no_memory_grows_whatever_disturbs(
     assert set(found.disturbances) == {"push", "pause", "reset", "set_gain", "set_duration"}
 
 
+@pytest.mark.slow
 def test_a_tick_that_is_lost_is_found(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     del domain
 

@@ -89,6 +89,7 @@ def test_a_jump_has_one_flight_and_goes_nowhere(runner: InProcessRunner) -> None
     assert np.abs(taken(run).speed[run.times > 2.9]).max() < 0.1
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_has_a_flight_in_each_step(runner: InProcessRunner) -> None:
     case = _case("run", 8.0, {"behaviour": "state_machine", "machine": "run"}, "2,0,0@0.2")

@@ -22,6 +22,7 @@ def result(runner: InProcessRunner) -> StudyResult:
     return runner.study("reactions")
 
 
+@pytest.mark.nightly
 def test_the_measured_impulses_are_about_those_that_were_planned(result: StudyResult) -> None:
     measured = np.array(result.column("measured impulse (N s)"))
 
@@ -29,12 +30,14 @@ def test_the_measured_impulses_are_about_those_that_were_planned(result: StudyRe
     np.testing.assert_allclose(measured, IMPULSES, rtol=0.15)
 
 
+@pytest.mark.nightly
 def test_the_harder_the_hit_the_farther_the_root_gives_way(result: StudyResult) -> None:
     peaks = result.column("largest displacement of the root (m)")
 
     assert peaks == sorted(peaks) and len(set(peaks)) == len(IMPULSES)
 
 
+@pytest.mark.nightly
 def test_it_is_back_within_two_seconds_if_it_does_not_fall(result: StudyResult) -> None:
     back = result.column("back on the clip (s)")
 
@@ -44,11 +47,13 @@ def test_it_is_back_within_two_seconds_if_it_does_not_fall(result: StudyResult) 
     assert min(result.column("REACT (s)")[:-1]) > 0.0
 
 
+@pytest.mark.nightly
 def test_the_pictures_are_there(result: StudyResult) -> None:
     kinds = ("ragdoll", "active_ragdoll", "reactive")
     assert set(result.figures) == {"reactions", *(f"reactions_{kind}" for kind in kinds)}
 
 
+@pytest.mark.nightly
 def test_the_captured_motion_is_above_its_reaction(result: StudyResult) -> None:
     captured, reaction = result.figures["reactions_reactive"].axes
 

@@ -208,6 +208,7 @@ def by_key(result: StudyResult, keys: int) -> Mapping[tuple[Any, ...], dict[str,
     return {tuple(row.values())[:keys]: dict(row) for row in result.rows}
 
 
+@pytest.mark.nightly
 def test_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gains, "_DURATION", 2.5)
     monkeypatch.setattr(gains, "_PICTURES", 1)
@@ -273,6 +274,7 @@ def test_a_step_overshoots_as_the_linear_whole_body_does(tmp_path: Path) -> None
         assert (expected > 0.4) == (factors == (1.0, 0.1))
 
 
+@pytest.mark.nightly
 def test_delay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delay, "_DURATION", 1.0)
     monkeypatch.setattr(delay, "_RATES", (240, 960))

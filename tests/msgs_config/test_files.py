@@ -146,6 +146,7 @@ _PLAIN = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.sampled_from(["topics", "duration", "1", "no"]), _PLAIN))
 @settings(max_examples=100, deadline=None)
 def test_yaml_is_written_such_that_others_read_the_same(content: dict[str, object]) -> None:

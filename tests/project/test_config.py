@@ -196,6 +196,7 @@ def test_the_nodes_start_with_a_file_and_run(
     assert complaints(nodes) == []
 
 
+@pytest.mark.slow
 def test_a_file_is_for_any_namespace(processes: Processes, client: SimulatorClient) -> None:
     states = client.listen(topics.JOINT_STATES.under("here/there"))
 
@@ -307,7 +308,7 @@ def hash_in(directory: Path) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", MOTIONS[:2])
+@pytest.mark.parametrize("file", [pytest.param(MOTIONS[0], marks=pytest.mark.nightly), MOTIONS[1]])
 def test_the_nodes_of_a_file_have_the_states_of_a_run(
     processes: Processes, tmp_path: Path, file: str
 ) -> None:
@@ -327,6 +328,7 @@ def test_the_nodes_of_a_file_have_the_states_of_a_run(
     assert again.state_hashes == found
 
 
+@pytest.mark.slow
 def test_nodes_of_one_process_take_a_file_and_have_the_same_states(
     processes: Processes, tmp_path: Path
 ) -> None:

@@ -240,9 +240,8 @@ def centre_of_mass(state: JointState) -> tuple[FloatArray, FloatArray]:
     return weighted / humanoid.mass, linear / humanoid.mass
 
 
-@pytest.mark.parametrize(
-    ("pushed", "heading"), [(1, 2.6), pytest.param(3, 0.0, marks=pytest.mark.nightly)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("pushed", "heading"), [(1, 2.6), (3, 0.0)])
 def test_the_humanoid_balances_by_its_sensors_and_bears_pushes(
     processes: Processes, client: SimulatorClient, pushed: int, heading: float
 ) -> None:

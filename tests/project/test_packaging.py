@@ -77,6 +77,7 @@ def test_what_users_read_and_launch_is_shared(prefix: Path, folder: str) -> None
     assert shared
 
 
+@pytest.mark.slow
 def test_the_package_is_known_to_ros(
     prefix: Path, environment: dict[str, str], processes: Processes
 ) -> None:
@@ -104,6 +105,7 @@ def test_files_that_a_package_reads_come_with_it(environment: dict[str, str]) ->
     assert all((installed / path).is_file() for path in needed)
 
 
+@pytest.mark.slow
 def test_an_installed_node_runs_with_an_installed_file(
     prefix: Path, environment: dict[str, str], processes: Processes
 ) -> None:

@@ -29,6 +29,7 @@ ROOMS = (
 )
 
 
+@pytest.mark.slow
 def test_every_command_line_of_a_page_is_one_that_the_parser_takes():
     lines = []
     for page in PAGES:

@@ -162,6 +162,7 @@ def test_the_state_path_has_both_sides() -> None:
     }
 
 
+@pytest.mark.slow
 def test_nothing_in_the_state_path_has_last_bits_of_the_processors_choosing() -> None:
     found = [
         f"{file}, {offence}"

@@ -101,6 +101,7 @@ def test_a_recording_is_viewed(viewed: "subprocess.Popen[str]") -> None:
         assert page.status == 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [

@@ -66,6 +66,7 @@ def test_the_blow_that_lowers_a_mass_too_far_is_that_of_theory(tmp_path: Path) -
     assert again.stdout == done.stdout
 
 
+@pytest.mark.nightly
 def test_a_search_is_not_taken_for_another_one(tmp_path: Path) -> None:
     (tmp_path / "lift.yaml").write_text(FILE.replace("to: 6.0", "to: 0.1"))
     assert search(tmp_path, "--workers", "1").returncode == 0

@@ -27,6 +27,7 @@ sys.exit(cli.main(sys.argv[1:-1]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_that_was_swallowed_ends_the_run_before_it_begins(
     processes: Processes, tmp_path: Path, number: signal.Signals

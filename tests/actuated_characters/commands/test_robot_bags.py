@@ -75,6 +75,7 @@ def test_render_draws_it(bag: Path, robot: str, capsys: pytest.CaptureFixture[st
     assert np.abs(first - last).max() > 0.2  # the arm has moved
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_render_makes_a_film_of_a_bag_that_says_whose_it_is(described: Path) -> None:
     assert main(["render", str(described), "--video", "--size", "64x48", "--fps", "10"]) == 0
@@ -119,6 +120,7 @@ def test_export_writes_it(suffix: str, bag: Path, robot: str, tmp_path: Path) ->
     assert content["animations"]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_view_shows_it(described: Path, bag: Path, robot: str, processes: Processes) -> None:
     viewer = processes.command("view", str(described), str(bag), "--character", robot)

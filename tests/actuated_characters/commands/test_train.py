@@ -39,6 +39,7 @@ def small(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(outcome, "_TRIALS", 2)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     given = ["--set", "controller_node.rate:=120", "--seed", "3"]
@@ -64,6 +65,7 @@ def test_what_it_makes_is_played(capsys: pytest.CaptureFixture[str], tmp_path: P
         assert name in ("bag", "summary.json") or str(shown / name) in said
 
 
+@pytest.mark.nightly
 def test_another_runs_results_are_replaced_where_files_may_be(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -97,6 +99,7 @@ def test_files_where_its_run_would_go_are_left_alone(
     read_policy("walk.npz", HUMANOID)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_what_learned_to_be_steered_is_steered(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
@@ -196,6 +199,7 @@ def no_trials(*ignored: object) -> Trial:
     return Trial(0.4, True, 0.01, 0.02)
 
 
+@pytest.mark.nightly
 def test_it_overwrites_and_goes_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -232,6 +236,7 @@ def interrupted_at(
     monkeypatch.setattr(Training, "go_on", interrupted)
 
 
+@pytest.mark.slow
 def test_an_interruption_keeps_the_best(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -284,6 +289,7 @@ def test_a_file_of_many_clips_is_named_by_the_first_ones() -> None:
     assert output == Path("policies/humanoid-walk-run-jump-and-2-more.npz")
 
 
+@pytest.mark.nightly
 def test_a_folders_clips_are_learned_by_one_policy(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -299,6 +305,7 @@ def test_a_folders_clips_are_learned_by_one_policy(
     assert {name.rsplit(", ", 1)[0] for name in policy.about["figures"]} == {*policy.about["clips"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("over", [0, 1])
 def test_a_second_interruption_leaves_out_the_runs_that_are_not_over(
     over: int,

@@ -53,12 +53,13 @@ def plan_of(name: str) -> RunPlan:
     return make_plan("humanoid", 0.4, WALK, {}, PLANNED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
         "pendulum",
         pytest.param("walk", marks=pytest.mark.slow),
-        pytest.param("planned", marks=pytest.mark.slow),
+        pytest.param("planned", marks=[pytest.mark.slow, pytest.mark.nightly]),
     ],
 )
 def test_a_run_has_the_states_of_one_without_ros_and_its_recording_is_whole(
@@ -74,6 +75,7 @@ def test_a_run_has_the_states_of_one_without_ros_and_its_recording_is_whole(
     assert replay(read_recordings(tmp_path / "run")).state_hashes == {"": expected}
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_what_it_recorded_replays_through_topics(domain: int, tmp_path: Path) -> None:
     del domain

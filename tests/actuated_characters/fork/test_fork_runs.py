@@ -147,7 +147,9 @@ def test_pushes_resets_pauses_and_what_a_controller_is_asked_come_again(
     [
         pytest.param(("--behaviour", "ragdoll"), marks=pytest.mark.nightly),
         ("--behaviour", "active_ragdoll", "--composed", "--sensor", "all"),
-        ("--in-process", "--planner", "predictive", *QUICK_PLAN),
+        pytest.param(
+            ("--in-process", "--planner", "predictive", *QUICK_PLAN), marks=pytest.mark.nightly
+        ),
         pytest.param(
             ("--set", "sim_node.real_time_factor:=4", "--compression", "zstd"),
             marks=pytest.mark.nightly,

@@ -70,6 +70,9 @@ KINDS: dict[str, tuple[str, ...]] = {
     ),
 }
 
+# Those that take longer than another one of the same code.
+LONGER = {"other engine, limp", "planned", "policy, other engine", "substeps"}
+
 
 @pytest.fixture(scope="module")
 def make(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
@@ -115,7 +118,10 @@ def assert_ends_alike(part: Recording, whole: Recording) -> None:
     assert part.effort.tobytes() == whole.effort[1 - count :].tobytes()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=pytest.mark.nightly if kind in LONGER else []) for kind in KINDS],
+)
 def test_a_fork_from_a_keyframe_ends_as_the_run_did(
     make: Callable[..., Path], kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -147,6 +153,7 @@ def test_a_fork_of_a_fork_goes_on_from_its_keyframe(walk: Path) -> None:
     assert_ends_alike(read_recording(second), read_recording(walk))
 
 
+@pytest.mark.nightly
 def test_over_topics_it_is_the_same_fork(walk: Path) -> None:
     sent = fork(walk, "sent", "--through-topics")
     assert_ends_alike(read_recording(sent), read_recording(walk))

@@ -85,6 +85,7 @@ def test_a_turn_about_changing_axes_is_kept() -> None:
     assert len(found.keyframes.times) <= 121 / 10
 
 
+@pytest.mark.slow
 def test_a_larger_tolerance_needs_fewer_keys() -> None:
     samples = hinge(np.sin(9.0 * TIMES) + 0.2 * np.sin(31.0 * TIMES))
     counts = []
@@ -129,6 +130,7 @@ def test_keys_stay_within_limits() -> None:
     check(found, samples, Tolerances())
 
 
+@pytest.mark.slow
 def test_frames_too_far_apart_get_keys_between_them() -> None:
     values = np.where(np.arange(121) % 2, 0.8, -0.8)
     samples = hinge(values)

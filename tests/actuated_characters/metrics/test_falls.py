@@ -218,6 +218,7 @@ def test_a_ragdoll_falls_and_says_that_it_was_limp(tmp_path: Path) -> None:
     assert 0.2 < float(str(run.summary["fell_at_s"])) < 1.5
 
 
+@pytest.mark.slow
 def test_a_machine_that_is_thrown_down_fell_and_its_root_has_no_error(tmp_path: Path) -> None:
     spec = RunSpec(
         "machine",

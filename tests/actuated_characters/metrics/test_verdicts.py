@@ -60,15 +60,18 @@ def pushed(folder: Path, seed: int) -> RunResult:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(6, 14), pytest.param(range(24), marks=pytest.mark.nightly)]
+    ("seeds", "of_each"),
+    [(range(6, 9), 1), pytest.param(range(24), 3, marks=pytest.mark.nightly)],
 )
-def test_of_pushed_machines_those_fell_that_are_seen_to(tmp_path: Path, seeds: range) -> None:
+def test_of_pushed_machines_those_fell_that_are_seen_to(
+    tmp_path: Path, seeds: range, of_each: int
+) -> None:
     runs = [pushed(tmp_path, seed) for seed in seeds]
 
     seen = [seen_to_fall("humanoid", run.recording.position) for run in runs]
     told = [run.summary["fell"] for run in runs]
     assert told == seen
-    assert 3 <= sum(seen) <= len(seeds) - 3  # of both kinds
+    assert of_each <= sum(seen) <= len(seeds) - of_each
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0])

@@ -218,6 +218,7 @@ def test_over_topics_it_is_what_was_found_bit_for_bit(
     assert main(["replay", str(directory)]) == 0
 
 
+@pytest.mark.nightly
 def test_the_number_of_processes_and_an_interruption_change_nothing(
     kick: tuple[Path, Reconstruction], tmp_path: Path
 ) -> None:
@@ -429,7 +430,13 @@ def test_a_mistake_is_one_line(
     assert last.startswith("error: ") and reason in last
 
 
-@pytest.mark.parametrize("early", [True, False], ids=["as processes begin", "later"])
+@pytest.mark.parametrize(
+    "early",
+    [
+        pytest.param(True, id="as processes begin"),
+        pytest.param(False, id="later", marks=pytest.mark.nightly),
+    ],
+)
 def test_ctrl_c_leaves_no_process_and_what_was_found(tmp_path: Path, *, early: bool) -> None:
     output, mark = tmp_path / "walk.json", f"{tmp_path}"
     few = [f"--set=controller_node.{name}:={value}" for name, value in QUICK.items()]

@@ -171,6 +171,7 @@ def only_line(process: Process) -> str:
     return line
 
 
+@pytest.mark.nightly
 def test_a_run_stores_and_compresses_its_bag_as_it_is_told(
     processes: Processes, tmp_path: Path
 ) -> None:

@@ -153,7 +153,8 @@ def test_the_run_is_the_same_to_all_who_read_it(
     assert tables[0] == tables[1]
 
 
-@pytest.mark.parametrize("storage", ["mcap", pytest.param("sqlite3", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@EACH_STORAGE
 def test_players_in_the_place_of_either_node_get_the_same(
     runs: dict[str, Path], storage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

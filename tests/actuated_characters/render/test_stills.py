@@ -333,7 +333,9 @@ def test_an_animation_that_would_not_fit_into_memory_is_refused(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGINT, marks=pytest.mark.nightly), signal.SIGKILL]
+)
 def test_a_movie_that_is_interrupted_or_killed_leaves_no_process(
     run: Path, processes: Processes, tmp_path: Path, number: signal.Signals
 ) -> None:

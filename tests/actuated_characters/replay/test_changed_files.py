@@ -40,6 +40,7 @@ def run(tmp_path: Path, keys: Path) -> Path:
     return tmp_path / "run"
 
 
+@pytest.mark.slow
 def test_a_fork_and_a_replay_say_that_keyframes_are_others(
     run: Path, keys: Path, domain: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -126,6 +126,7 @@ def test_delays_clipped_torques_pushes_pauses_and_a_reset_come_again(eventful: P
     assert told and told == sorted(told) and told[-1] <= TICKS + 1
 
 
+@pytest.mark.nightly
 def test_what_the_clock_decided_comes_again_from_the_efforts_applied(realtime: Path) -> None:
     recording = read_recording(realtime)
     assert np.abs(recording.effort).max() == 2.0  # its limit
@@ -256,12 +257,14 @@ def test_a_gain_that_is_not_changed_as_it_was_is_found_at_its_first_tick(eventfu
     assert comparison.within(comparison.largest_difference)
 
 
+@pytest.mark.nightly
 def test_each_character_of_a_world_can_be_answered(pair: Path) -> None:
     comparison = by_states(pair, character="right")
 
     assert comparison.identical and comparison.states >= 40
 
 
+@pytest.mark.nightly
 def test_states_that_the_controller_never_saw_are_left_out(realtime: Path) -> None:
     recording = read_recording(realtime)
     answered = sum(map(bool, recording.commands))
@@ -272,6 +275,7 @@ def test_states_that_the_controller_never_saw_are_left_out(realtime: Path) -> No
     assert comparison.states == answered > 1  # a busy machine answers few
 
 
+@pytest.mark.nightly
 def test_a_controller_that_drives_less_is_told(walk: Path) -> None:
     comparison = by_states(walk, settings={"root_assistance": False})
 
@@ -298,6 +302,7 @@ def late(eventful: Path, folder: Path) -> Path:
     return rewrite(eventful / "bag", folder / "late", change)
 
 
+@pytest.mark.nightly
 def test_the_second_episode_alone_comes_again(late: Path, eventful: Path) -> None:
     whole, recording = read_recording(eventful), read_recording(late)
     assert recording.stamps_ns[0] == whole.stamps_ns[whole.episode_rows[1]]
@@ -308,6 +313,7 @@ def test_the_second_episode_alone_comes_again(late: Path, eventful: Path) -> Non
     assert (result.states, result.episodes) == (len(recording.stamps_ns), 1)
 
 
+@pytest.mark.nightly
 def test_its_controller_begins_with_what_was_in_force_then(late: Path) -> None:
     recording = read_recording(late)
     assert first_parameters(recording)["law"] == "zero"

@@ -176,6 +176,7 @@ def test_the_parameters_left_behind_start_the_nodes_alone_into_the_same_states(
         context.try_shutdown()
 
 
+@pytest.mark.nightly
 def test_composed_the_run_has_the_same_figures_and_leaves_the_same_files(
     walk: Path, together: Processes, tmp_path: Path
 ) -> None:
@@ -213,6 +214,7 @@ def test_root_that_is_not_commanded_switches_assistance_off() -> None:
     assert plan.controller["root_assistance"] is False
 
 
+@pytest.mark.nightly
 def test_two_runs_at_once_take_different_domains_and_do_not_hear_each_other(
     processes: Processes, tmp_path: Path
 ) -> None:
@@ -375,7 +377,11 @@ def test_every_error_says_what_was_wrong_and_what_would_have_been_right(
 
 
 @pytest.mark.parametrize(
-    ("way", "process", "node"), [((), "sim_node", ""), (("--composed",), "composed", "sim_node: ")]
+    ("way", "process", "node"),
+    [
+        ((), "sim_node", ""),
+        pytest.param(("--composed",), "composed", "sim_node: ", marks=pytest.mark.nightly),
+    ],
 )
 def test_a_divergence_ends_the_run_with_the_simulators_own_message(
     processes: Processes, tmp_path: Path, way: tuple[str, ...], process: str, node: str
@@ -410,6 +416,7 @@ def test_a_signal_ends_it_in_seconds_and_keeps_what_was_recorded(
     assert ticks == list(range(1, len(ticks) + 1))
 
 
+@pytest.mark.nightly
 def test_without_a_bag_no_process_records_and_a_signal_keeps_the_figures(
     domain: int, processes: Processes, context: Context, tmp_path: Path
 ) -> None:

@@ -69,7 +69,16 @@ def recording_of(plan: RunPlan) -> dict[str, object]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("run", [reactive_pushed_with_a_ball, steered_machine, planned_backflip])
+@pytest.mark.parametrize(
+    "run",
+    [
+        reactive_pushed_with_a_ball,
+        *(
+            pytest.param(each, marks=pytest.mark.nightly)
+            for each in (steered_machine, planned_backflip)
+        ),
+    ],
+)
 def test_the_messages_are_those_of_a_run_over_topics(
     run: Callable[[], PlannedRun], tmp_path: Path
 ) -> None:
@@ -192,6 +201,7 @@ def test_what_went_wrong_has_the_name_of_its_node_and_the_bag_what_came_before(
     assert messages_by_topic(tmp_path / "run" / "bag")["/joint_states"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_leaves_a_whole_bag(
     processes: Processes, tmp_path: Path, number: signal.Signals

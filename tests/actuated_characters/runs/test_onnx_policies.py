@@ -125,6 +125,7 @@ def run(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
+@pytest.mark.slow
 def test_targets_are_what_numpy_says_of_the_recorded_states(kind: str, run: Path) -> None:
     recording, (make, _, observation) = read_recording(run), KINDS[kind]
     network, last, frames = make(), np.zeros(12), []
@@ -153,6 +154,7 @@ def test_efforts_are_those_of_a_pd_law_with_the_policys_own_gains(run: Path) -> 
     assert not recording.effort[:, :6].any()
 
 
+@pytest.mark.slow
 def test_a_fork_in_the_middle_ends_as_the_run_did(run: Path) -> None:
     output = run.with_name("fork")
     assert main(["fork", str(run), "--at", "0.3", "--output", str(output)]) == 0

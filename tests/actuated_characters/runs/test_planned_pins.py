@@ -178,6 +178,7 @@ def test_from_its_bag_it_is_the_same_run(folder: Path, recording: Recording) -> 
     assert summary_of(folder / "run")["rejected_pins"] == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_over_topics_composed_and_from_either_bag_it_has_one_hash(
     folder: Path, tmp_path: Path
@@ -214,6 +215,7 @@ def test_of_two_characters_each_has_its_own_and_both_come_again(tmp_path: Path) 
 # Forks
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_fork_from_a_keyframe_while_a_pin_acts_ends_as_the_run_did(
     folder: Path, recording: Recording

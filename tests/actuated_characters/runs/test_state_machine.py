@@ -28,6 +28,7 @@ def planned() -> tuple[RunPlan, list[PlannedVelocity]]:
     return plan_velocities(plan, COMMANDS)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_is_replayed_to_the_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan, velocities = planned()
@@ -67,6 +68,7 @@ def test_a_jump_over_topics_is_the_one_in_one_process_and_flies_by_its_recorded_
     assert replay([recording]).identical
 
 
+@pytest.mark.slow
 def test_the_command_says_what_is_wrong_with_a_machine(processes: Processes) -> None:
     run = Run(processes, "run", "--machine", "wlak", "--duration", "1")
 

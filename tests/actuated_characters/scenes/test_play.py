@@ -47,6 +47,7 @@ def hash_of(directory: Path, ticks: int) -> str:
     return str(summary["state_hash"])
 
 
+@pytest.mark.nightly
 def test_the_brawl_has_the_states_of_its_two_classes_and_replays(
     processes: Processes, tmp_path: Path, first_fall: Brawl
 ) -> None:
@@ -64,6 +65,7 @@ def test_the_brawl_has_the_states_of_its_two_classes_and_replays(
     assert replay(read_recordings(run)).state_hashes == found
 
 
+@pytest.mark.nightly
 def test_nodes_of_their_own_processes_have_the_same_states(
     processes: Processes, tmp_path: Path, first_fall: Brawl
 ) -> None:
@@ -93,6 +95,7 @@ def test_nodes_of_their_own_processes_have_the_same_states(
     assert commands.states == TICKS + 1
 
 
+@pytest.mark.nightly
 def test_they_collide_fall_and_get_up_again(brawl: Brawl) -> None:
     hits = np.flatnonzero(brawl.together > 100.0)
     assert len(hits)
@@ -109,6 +112,7 @@ def test_they_collide_fall_and_get_up_again(brawl: Brawl) -> None:
     assert (brawl.heights.max(axis=1) > 0.6).mean() > 0.5
 
 
+@pytest.mark.nightly
 def test_what_draws_them_is_bounded_as_the_scene_says(brawl: Brawl) -> None:
     nodes = load_scene("brawl").nodes
     for row, side in enumerate(SIDES):
@@ -191,6 +195,7 @@ def test_a_port_in_use_is_one_clear_line(processes: Processes) -> None:
     assert error.startswith(f"error: viewer failed: cannot listen on 127.0.0.1, port {port}: ")
 
 
+@pytest.mark.nightly
 def test_drive_goes_where_cmd_vel_says_and_replays(
     processes: Processes, client: SimulatorClient, tmp_path: Path
 ) -> None:
@@ -229,6 +234,7 @@ def test_what_a_node_refuses_is_one_clear_line(processes: Processes) -> None:
     assert "needs an 'opponent'" in error
 
 
+@pytest.mark.nightly
 def test_a_scene_that_lasts_a_tick_is_whole(processes: Processes, tmp_path: Path) -> None:
     command = processes.command("play", "--duration", "0.005", *FAST)
 

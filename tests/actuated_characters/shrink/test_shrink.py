@@ -96,6 +96,7 @@ def test_what_is_left_falls_and_less_of_it_does_not(
     assert duration == pytest.approx(float(summary_of(fallen)["fell_at_s"]) + 1.3, abs=0.01)  # type: ignore[arg-type]
 
 
+@pytest.mark.nightly
 def test_one_process_leaves_what_several_do(
     fallen: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -92,6 +92,7 @@ def table(results: Path) -> str:
     return (results / TABLE).read_text()
 
 
+@pytest.mark.nightly
 def test_one_worker_that_is_verified_by_itself(
     sweep_file: Path, alone: str, tmp_path: Path
 ) -> None:
@@ -112,6 +113,7 @@ def test_two_workers_of_which_one_is_killed(sweep_file: Path, alone: str, tmp_pa
     assert {path.name for path in tmp_path.iterdir()} <= {JOURNAL, TABLE, "table.parquet"}
 
 
+@pytest.mark.nightly
 def test_a_command_that_is_ended_in_three_ways_and_goes_on_with_four_workers(
     sweep_file: Path, alone: str, tmp_path: Path
 ) -> None:
@@ -156,6 +158,7 @@ def dask(
             process.kill()
 
 
+@pytest.mark.nightly
 def test_a_scheduler_with_two_workers_that_is_lost(
     sweep_file: Path, alone: str, tmp_path: Path
 ) -> None:

@@ -42,8 +42,8 @@ def outcome(arguments: tuple[str, ...], scratch: Path, *, ends_at_fall: bool) ->
         ((*STAND, push(60, 1.0), push(60, 0.3)), True),
         ((*STAND, "--set=controller_node.balance.enabled:=false", push(5, 2.1)), True),  # before
         (STAND, False),
-        ((*SENT, push(10, 1.0)), False),
-        ((*SENT, push(90, 1.0)), True),
+        pytest.param((*SENT, push(10, 1.0)), False, marks=pytest.mark.nightly),
+        pytest.param((*SENT, push(90, 1.0)), True, marks=pytest.mark.nightly),
         ((*POLICY, "--set=sim_node.engine:=mujoco", push(20, 0.9)), False),
         ((*POLICY, "--set=sim_node.engine:=mujoco", push(90, 0.9)), True),
     ],

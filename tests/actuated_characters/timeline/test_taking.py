@@ -68,6 +68,11 @@ def edited(first: Take, **changes: Any) -> Path:
     return written(first.directory.parent.parent, **changes)
 
 
+def night(*case: object) -> Any:
+    """A case that is more of the same as another one."""
+    return pytest.param(*case, marks=pytest.mark.nightly)
+
+
 def later(layer: dict[str, Any]) -> dict[str, Any]:
     poses = [*layer["poses"], {"at": 1.8, "pose": {"left_elbow": 0.2}}]
     return {**layer, "poses": poses}
@@ -80,11 +85,11 @@ def later(layer: dict[str, Any]) -> dict[str, Any]:
         ({"keys": [later(ELBOW)]}, (1.48, 1.5)),  # it does not come to rest there any more
         ({"keys": []}, (1.1, 1.2)),
         ({"pushes": [*CONTENT["pushes"], {"at": 1.6, "link": "root", "force": [0, 50, 0]}]}, 1.6),
-        ({"strengths": []}, 1.2),
+        night({"strengths": []}, 1.2),
         ({"limp": [{"at": 1.5, "until": 1.7}]}, 1.5),
-        ({"pins": [{**HELD, "at": 1.6}]}, 1.6),
+        night({"pins": [{**HELD, "at": 1.6}]}, 1.6),
         ({"throws": [{"at": 1.5, "mass": 1, "speed": 8, "target": "chest"}]}, (1.2, 1.5)),
-        ({"duration": 2.5}, 2.0 - 1 / RATE),
+        night({"duration": 2.5}, 2.0 - 1 / RATE),
         ({"duration": 1.5}, 1.5 - 1 / RATE),
     ],
     ids=[
@@ -141,10 +146,10 @@ def test_a_take_of_a_take_goes_on_from_either(first: Take, tmp_path: Path) -> No
     ("pins", "since"),
     [
         ([{**HELD, "until": 1.5}], 1.5),  # let go sooner
-        ([{**HELD, "until": 1.8}], 1.7),
-        ([HELD, {**HELD, "at": 1.7, "until": 1.9, "force": 20}], 1.7),
+        night([{**HELD, "until": 1.8}], 1.7),
+        night([HELD, {**HELD, "at": 1.7, "until": 1.9, "force": 20}], 1.7),
         ([HELD, {**HELD, "at": 1.2, "link": "left_wrist"}], 1.2),
-        ([], 0.4),
+        night([], 0.4),
     ],
     ids=["sooner", "later", "another force", "another hand", "none"],
 )
@@ -169,10 +174,10 @@ def test_a_take_of_other_pins_is_the_end_of_a_whole_run(
 @pytest.mark.parametrize(
     ("behaviours", "since"),
     [
-        ([{"at": 0.4, "until": 1.5, "do": "brace"}], 1.5),
-        ([{"at": 0.4, "until": 1.9, "do": "brace"}], 1.7),
+        night([{"at": 0.4, "until": 1.5, "do": "brace"}], 1.5),
+        night([{"at": 0.4, "until": 1.9, "do": "brace"}], 1.7),
         ([{"at": 0.4, "until": 1.2, "do": "brace"}, {"at": 1.3, "do": "react"}], 1.2),
-        ([{"at": 1.9, "do": "react"}], 0.4),
+        night([{"at": 1.9, "do": "react"}], 0.4),
     ],
     ids=["sooner", "later", "another one", "none"],
 )

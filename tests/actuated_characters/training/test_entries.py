@@ -67,6 +67,7 @@ def test_after_a_clip_it_begins_as_that_ends_at_moments_of_all_of_the_motion() -
     assert sum(entry.weight for entry in found) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clip", ["getup_faceup", "getup_facedown"])
 def test_after_a_fall_it_lies_and_gets_up_from_the_side_on_which_it_lies(clip: str) -> None:
     found = entries(clip, FALL)
@@ -83,6 +84,7 @@ def test_after_a_fall_it_lies_and_gets_up_from_the_side_on_which_it_lies(clip: s
     assert len(poses) > len(found) / 2  # they do not lie alike
 
 
+@pytest.mark.nightly
 def test_the_same_seed_has_the_same_falls() -> None:
     first, again, other = (entries("getup_faceup", FALL, seed) for seed in (1, 1, 2))
 

@@ -111,6 +111,7 @@ def test_the_slope_is_between_what_was_tried_and_what_was_taught() -> None:
     np.testing.assert_array_equal(both[:5], tried[:5])
 
 
+@pytest.mark.nightly
 def test_a_pupil_comes_to_answer_as_its_teacher() -> None:
     observations = observed(WALK.scales, 8 * 96).reshape(8, 96, -1)
     rows, flat = np.zeros(8 * 96, np.intp), observations.reshape(8 * 96, -1)

@@ -107,6 +107,7 @@ def test_a_training_that_is_resumed_goes_on_from_the_policy(
     assert strengths[0] != strengths[1], "the draws are those that it began with"
 
 
+@pytest.mark.nightly
 def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., Training]) -> None:
     walk = looked_at(begin()).best({})
     walk = replace(walk, about={**walk.about, "trained": {"decisions": 50, "pushes_ns": 12.0}})
@@ -133,6 +134,7 @@ def test_another_motions_policy_is_where_a_training_begins(begin: Callable[..., 
     assert first.scales.frame_mean.tobytes() == walk.scales.frame_mean.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_policies())
 def test_a_shipped_policy_is_where_a_training_may_begin(
     begin: Callable[..., Training], name: str

@@ -137,6 +137,7 @@ def test_the_page_has_shares_intervals_and_a_film_of_the_failure(result: Path) -
     assert len(rows) == 4
 
 
+@pytest.mark.nightly
 def test_all_rows_are_the_same_once_more(together: Processes, result: Path) -> None:
     again = Run(together, "verify", str(result), "--workers", "2").finish()
 
@@ -189,6 +190,7 @@ def test_a_controller_that_ends_early_is_a_row_with_its_last_words(
     assert (tmp_path / "result" / "rows" / "00001" / "logs" / "controller.log").is_file()
 
 
+@pytest.mark.nightly
 def test_a_controller_that_never_answers_is_one_as_well(
     together: Processes, tmp_path: Path
 ) -> None:
@@ -200,6 +202,7 @@ def test_a_controller_that_never_answers_is_one_as_well(
     wait_until(lambda: not run.family, "the end of all its processes")
 
 
+@pytest.mark.nightly
 def test_of_an_answer_that_is_none_it_is_told_what_the_simulator_said(
     together: Processes, tmp_path: Path
 ) -> None:
@@ -216,6 +219,7 @@ def test_of_an_answer_that_is_none_it_is_told_what_the_simulator_said(
     assert "'tail'" in error
 
 
+@pytest.mark.nightly
 def test_a_killed_trial_leaves_nothing_behind_and_goes_on(
     together: Processes, result: Path, tmp_path: Path
 ) -> None:

@@ -116,6 +116,7 @@ def root_of(client: SimulatorClient) -> "np.ndarray[tuple[int], np.dtype[np.floa
     return np.array([state.position[names.index(f"root_{axis}")] for axis in "xyz"])
 
 
+@pytest.mark.nightly
 def test_a_click_with_shift_throws_a_ball_that_hits(
     standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
 ) -> None:
@@ -229,6 +230,7 @@ def drag(browser: Browser, x: float, y: float, steps: int) -> None:
         browser.mouse("mouseMoved", x + 8 * step, y, pressed=True)
 
 
+@pytest.mark.nightly
 def test_a_drag_to_the_right_pushes_to_the_right_until_it_is_let_go_or_the_browser_is_killed(
     standing: Process, viewer: Process, browser: Browser, client: SimulatorClient
 ) -> None:
@@ -271,6 +273,7 @@ def test_a_drag_to_the_right_pushes_to_the_right_until_it_is_let_go_or_the_brows
         other.close()
 
 
+@pytest.mark.nightly
 def test_a_reload_brings_all_back_ten_pages_are_served_at_once_and_another_simulator_is_shown(
     processes: Processes, viewer: Process, browser: Browser
 ) -> None:

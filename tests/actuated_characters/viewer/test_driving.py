@@ -120,6 +120,7 @@ def root(reference: ReceivedMessages, name: str) -> float:
     return float(message.position[list(message.name).index(name)])
 
 
+@pytest.mark.nightly
 def test_keys_walk_run_turn_and_stop_when_they_are_let_go_which_replays_to_the_bit(
     processes: Processes,
     browser: Browser,
@@ -163,6 +164,7 @@ def test_keys_walk_run_turn_and_stop_when_they_are_let_go_which_replays_to_the_b
     assert again.identical
 
 
+@pytest.mark.nightly
 def test_the_button_drives_at_the_sliders_velocities_until_it_is_let_go_or_the_browser_dies(
     processes: Processes,
     browser: Browser,

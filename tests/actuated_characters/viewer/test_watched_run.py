@@ -54,6 +54,7 @@ def test_a_run_that_is_watched_has_the_state_hash_of_one_that_is_not(
     assert "Traceback" not in (watched / "logs" / "viewer.log").read_text()
 
 
+@pytest.mark.nightly
 def test_a_run_goes_on_when_its_viewer_is_killed(processes: Processes, tmp_path: Path) -> None:
     run = Run(
         processes,
@@ -79,6 +80,7 @@ def test_a_run_goes_on_when_its_viewer_is_killed(processes: Processes, tmp_path:
     assert not run.family
 
 
+@pytest.mark.nightly
 def test_a_port_in_use_does_not_end_the_run(processes: Processes, tmp_path: Path) -> None:
     with open_socket("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]

@@ -53,6 +53,7 @@ def floated(values: Floats) -> Floats:
     return values
 
 
+@pytest.mark.slow
 def test_a_capture_that_floats_gets_a_remark_and_is_put_on_the_ground(tmp_path: Path) -> None:
     target = TargetBody(character("humanoid"))
     maker = replace(MAKERS["bandai"], rate=30.0)

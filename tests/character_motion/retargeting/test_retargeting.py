@@ -107,6 +107,7 @@ def test_frames_come_at_the_file_s_own_rate(
     check_bars(made)
 
 
+@pytest.mark.slow
 def test_noise_of_a_degree_does_not_shake_the_body(tmp_path: Path, target: TargetBody) -> None:
     noisy = replace(MAKERS["rokoko"], noise=1.0)  # 100 frames a second: up to 2 rad/s each
     calm, shaken = (
@@ -125,6 +126,7 @@ def test_two_frames_are_a_motion(tmp_path: Path, target: TargetBody) -> None:
     assert len(import_bvh(file, target).clip.times) == 2
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_long_file_solved_in_windows_is_the_same_as_solved_at_once(
     tmp_path: Path, target: TargetBody, monkeypatch: pytest.MonkeyPatch

@@ -152,6 +152,7 @@ def walk(terrain: Path, force: float) -> Walked:
     return Walked(modes, np.array(root))
 
 
+@pytest.mark.slow
 def test_who_is_pushed_onto_a_plate_walks_on_there(beside: Path) -> None:
     walked = walk(beside, 1000.0)
 
@@ -160,6 +161,7 @@ def test_who_is_pushed_onto_a_plate_walks_on_there(beside: Path) -> None:
     assert walked.root[-240:, 2].min() > PLATE + 0.75
 
 
+@pytest.mark.slow
 def test_who_falls_onto_a_plate_gets_up_there_and_walks_off_it(beside: Path) -> None:
     walked = walk(beside, 2500.0)
 
@@ -172,6 +174,7 @@ def test_who_falls_onto_a_plate_gets_up_there_and_walks_off_it(beside: Path) -> 
     assert 0.75 < walked.root[-1, 2] < 0.9
 
 
+@pytest.mark.slow
 def test_who_falls_into_a_pit_gets_up_by_the_clip_that_is_near(tmp_path: Path) -> None:
     terrain = tmp_path / "pit.yaml"
     terrain.write_text(PIT)

@@ -191,6 +191,7 @@ def test_a_rollout_depends_on_its_own_plan_alone() -> None:
         assert together.tobytes() == np.array(alone).tobytes()
 
 
+@pytest.mark.slow
 def test_steps_of_several_ticks_are_ticks_of_a_slower_clock() -> None:
     course, states = desired(clip("walk"), 70)
     position, velocity = start_of(states)

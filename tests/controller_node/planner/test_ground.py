@@ -226,6 +226,7 @@ def arrives(plan: RunPlan) -> float:
     return float(position[0])
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_it_walks_over_a_plate_that_it_feels(tmp_path: Path) -> None:
     (tmp_path / "plate.yaml").write_text("boxes: [{at: [1.5, 0], size: [0.8, 4, 0.05]}]")

@@ -223,6 +223,7 @@ def test_neither_threads_nor_what_else_is_done_change_a_bit() -> None:
     assert walked(planning_delay_ticks=7, plan__workers=2) == overlapping != alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 5, 12])
 def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(delay: int) -> None:
     controller = a_controller(planning_delay_ticks=delay)
@@ -242,6 +243,7 @@ def test_a_state_that_comes_again_changes_nothing_and_an_episode_forgets_all(del
     assert answers(3) == once
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 5])
 def test_a_state_of_before_is_planned_from_as_if_none_had_followed(delay: int) -> None:
     controller, fresh = (a_controller(planning_delay_ticks=delay) for _ in range(2))
@@ -256,6 +258,7 @@ def test_a_state_of_before_is_planned_from_as_if_none_had_followed(delay: int) -
     assert effort.tobytes() == expected.tobytes()
 
 
+@pytest.mark.slow
 def test_a_plan_is_of_the_state_that_its_delay_is_before() -> None:
     delay, acts = 5, 12
 
@@ -359,6 +362,7 @@ def test_a_reference_gives_way_to_a_push_unless_it_is_to_stay(gives_way: bool) -
     assert (abs(controller.outlook.anchor.place) > 0.05) == gives_way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", [6, 9])
 def test_a_state_that_comes_while_a_plan_is_sought_is_no_news(again: int) -> None:
     """Pushed, so that the reference gives way; the plan of tick 12 is sought in tick 7."""
@@ -417,7 +421,10 @@ def test_runs_that_are_planned_have_contacts_that_keep_their_points(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("duration", "step"),
-    [(0.6, 0.0), (0.6, 0.009), pytest.param(1.27, 0.0, marks=pytest.mark.nightly)],
+    [
+        (0.6, 0.009),
+        *(pytest.param(each, 0.0, marks=pytest.mark.nightly) for each in (0.6, 1.27)),
+    ],
 )
 def test_a_walk_goes_on_by_its_joints_alone(duration: float, step: float) -> None:
     settings = {"planner": "predictive", "plan.step": step}

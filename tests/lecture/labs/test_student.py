@@ -101,6 +101,7 @@ def test_a_mistake_is_a_line(student: Student, function: str, line: int, said: s
     assert student.number("chatters", 2.0) == 2.0  # the process goes on
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("function", "lines"), [("endless", (11, 12)), ("stubborn", (16, 17, 18))])
 def test_an_endless_loop_is_ended_where_it_is(
     student: Student, function: str, lines: tuple[int, ...]

@@ -239,6 +239,7 @@ LISTINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("listing", LISTINGS)
 def test_a_urdf_may_list_its_links_in_any_order(write: WriteCharacter, listing: str) -> None:
     urdf = robot(

@@ -50,6 +50,7 @@ def test_a_change_in_a_callee_of_another_file_counts(tmp_path: Path) -> None:
     assert printed == ["2.0\n", "3.0\n"]
 
 
+@pytest.mark.slow
 def test_a_line_says_when_something_is_compiled_and_none_when_it_is_kept(tmp_path: Path) -> None:
     (tmp_path / "one.py").write_text(
         "from pathlib import Path\n"

@@ -325,6 +325,7 @@ while rclpy.ok():
 """
 
 
+@pytest.mark.nightly
 def test_a_signal_ends_a_recorder_to_whom_more_comes_than_it_can_take(
     forked: Processes, own_graph: int, tmp_path: Path
 ) -> None:
@@ -372,8 +373,8 @@ def has_come_to(process: Process, stage: str) -> bool:
 
 
 def marks_of(name: str, stage: str) -> list[pytest.MarkDecorator]:
-    again = name in ("controller_node", "composed") and stage in COMMON_STAGES
-    return [pytest.mark.nightly] if again else []
+    again = {"controller_node": COMMON_STAGES, "composed": STAGES["composed"][:-1]}.get(name, [])
+    return [pytest.mark.nightly] if stage in again else []
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,7 @@ def simulator(processes: Processes) -> Simulator:
 # /tf and /tf_static
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["humanoid", "franka_panda", FLOATING_TURNED_FRAMES])
 def test_the_frames_of_the_links_are_where_the_other_engine_has_them(
     simulator: Simulator, client: SimulatorClient, frames: Frames, name: str
@@ -89,6 +90,7 @@ def test_the_frames_of_the_links_are_where_the_other_engine_has_them(
         np.testing.assert_allclose(found, matrix, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_tree_is_that_of_rep_105_and_fixed_joints_are_static(
     simulator: Simulator, client: SimulatorClient, frames: Frames
 ) -> None:
@@ -107,6 +109,7 @@ def test_the_tree_is_that_of_rep_105_and_fixed_joints_are_static(
     np.testing.assert_allclose(base[:3, :3], np.eye(3), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_fixed_base_is_static_and_frames_have_the_names_that_are_given(
     simulator: Simulator, client: SimulatorClient, frames: Frames
 ) -> None:
@@ -121,6 +124,7 @@ def test_a_fixed_base_is_static_and_frames_have_the_names_that_are_given(
     assert "world" not in frames.parents
 
 
+@pytest.mark.slow
 def test_frames_come_at_the_display_rate(
     simulator: Simulator, client: SimulatorClient, frames: Frames
 ) -> None:
@@ -173,6 +177,7 @@ def test_who_looks_later_at_a_waiting_simulator_gets_the_frames(
     np.testing.assert_allclose(base[:3, :3], np.eye(3), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_bag_has_the_frames_where_their_type_is_installed(
     simulator: Simulator, processes: Processes, tmp_path: Path
 ) -> None:
@@ -198,6 +203,7 @@ def test_a_bag_has_the_frames_where_their_type_is_installed(
     assert found["/tf_static"] == {"odom", "base_link", whole.links[0].name}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["humanoid", pytest.param("laikago", marks=pytest.mark.slow)])
 def test_the_description_and_the_frames_alone_look_like_the_renderers_picture(
     simulator: Simulator, client: SimulatorClient, frames: Frames, name: str

@@ -402,6 +402,7 @@ def test_commands_and_pushes_for_another_simulator_are_rejected_counted_and_name
     assert session in line
 
 
+@pytest.mark.slow
 def test_two_simulators_on_the_same_topics_name_each_other(
     processes: Processes, client: SimulatorClient
 ) -> None:

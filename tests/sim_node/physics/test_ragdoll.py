@@ -131,7 +131,13 @@ def drop(seed: int, *, to_the_end: bool) -> Drop:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=[] if seed in (0, *EXTREME) else pytest.mark.nightly)
+        for seed in SEEDS
+    ],
+)
 def test_a_dropped_ragdoll_gains_no_energy_and_comes_to_rest_within_its_limits(seed: int) -> None:
     end = drop(seed, to_the_end=seed in TO_THE_END)
 

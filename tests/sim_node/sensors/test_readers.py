@@ -228,6 +228,7 @@ def test_contacts_change_the_momentum_of_a_box_that_tumbles(tmp_path: Path, subs
     assert hardest > 20.0 * 2.0 * G
 
 
+@pytest.mark.slow
 def test_the_soles_of_a_standing_humanoid_bear_its_weight() -> None:
     run = simulation("humanoid")
     run.watches_contacts = True

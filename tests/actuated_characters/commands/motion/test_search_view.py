@@ -47,7 +47,7 @@ def children_of(pid: int) -> list[int]:
     ]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.nightly), 2])
 def test_a_search_that_is_watched_finds_the_same_and_shows_it_until_ctrl_c(
     processes: Processes, tmp_path: Path, workers: int
 ) -> None:
@@ -69,6 +69,7 @@ def test_a_search_that_is_watched_finds_the_same_and_shows_it_until_ctrl_c(
     assert not [pid for pid in family if Path(f"/proc/{pid}").exists()]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_in_the_search_leaves_the_checkpoint_and_no_process(
     processes: Processes, tmp_path: Path, workers: int
@@ -88,6 +89,7 @@ def test_ctrl_c_in_the_search_leaves_the_checkpoint_and_no_process(
     assert not [pid for pid in family if Path(f"/proc/{pid}").exists()]
 
 
+@pytest.mark.nightly
 def test_the_search_goes_on_where_its_page_is_killed(processes: Processes, tmp_path: Path) -> None:
     output = tmp_path / "kick.json"
     view = ("--view", f"--port={free_port()}", "--workers=1")
@@ -154,6 +156,7 @@ def play(processes: Processes, scene: Path, *options: str) -> Process:
     return processes.command("play", "--scene", str(scene), "--duration", "0.4", *options)
 
 
+@pytest.mark.nightly
 def test_a_scene_is_sought_shown_and_ended_by_ctrl_c(
     processes: Processes, tmp_path: Path, scene: Path
 ) -> None:
@@ -169,6 +172,7 @@ def test_a_scene_is_sought_shown_and_ended_by_ctrl_c(
     assert re.search(r"0\.4 s, 96 ticks, 2 windows", command.stdout)
 
 
+@pytest.mark.nightly
 def test_without_a_page_a_scene_ends_when_it_is_found_and_is_not_overwritten(
     processes: Processes, tmp_path: Path, scene: Path
 ) -> None:
@@ -183,6 +187,7 @@ def test_without_a_page_a_scene_ends_when_it_is_found_and_is_not_overwritten(
     assert play(processes, scene, *given, "--overwrite").wait(LONG) == 0
 
 
+@pytest.mark.nightly
 def test_ctrl_c_while_a_scene_is_sought_ends_it_in_good_order(
     processes: Processes, tmp_path: Path, scene: Path
 ) -> None:

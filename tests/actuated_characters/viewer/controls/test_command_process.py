@@ -13,6 +13,7 @@ def _ended(process: CommandProcess) -> CommandProcess:
     return process
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_ready", [False, True])
 def test_what_a_command_says_and_what_went_wrong_is_known_at_its_end(
     tmp_path: Path, is_ready: bool

@@ -211,6 +211,7 @@ def test_a_joint_is_set_by_its_number_within_its_limits(page: EditorPage, sessio
     assert fields._fields[0].value == 3.14
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["franka_panda", "laikago", "pendulum"])
 def test_any_character_can_be_posed(name: str, tmp_path: Path) -> None:
     whole = character(name)

@@ -74,6 +74,7 @@ def draw_arrow(browser: Browser, then: str = "Fork from here") -> str:
     return str(browser.evaluate(f"{field('Push')}.value"))
 
 
+@pytest.mark.nightly
 def test_an_arrow_on_the_paused_body_becomes_a_push_of_a_fork_that_plays_beside(
     viewer: Process, browser: Browser, walk: Path
 ) -> None:

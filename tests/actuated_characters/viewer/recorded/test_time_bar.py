@@ -77,6 +77,7 @@ def row_of(browser: Browser) -> int:
     return int(found)
 
 
+@pytest.mark.nightly
 def test_the_time_line_says_what_happened_and_goes_where_it_is_asked_to(
     viewer: Process, browser: Browser
 ) -> None:
@@ -176,6 +177,7 @@ NEVER_CAPTURED = """(() => {  // a made pointer cannot be captured
 })()"""
 
 
+@pytest.mark.nightly
 def test_a_drag_that_is_cancelled_leaves_the_next_click_its_mark(
     viewer: Process, browser: Browser
 ) -> None:
@@ -217,6 +219,7 @@ ANSWERS = """(async () => {
 })()"""
 
 
+@pytest.mark.nightly
 def test_marks_that_come_late_replace_no_newer_ones(viewer: Process, browser: Browser) -> None:
     open_bar(browser, viewer)
     until_at(browser, "1.000")

@@ -90,7 +90,8 @@ def test_it_turns_and_goes_sideways() -> None:
 @pytest.mark.parametrize(
     "command",
     [
-        *("0.9,0,0.5", "1.2,0.3,-0.5"),
+        "0.9,0,0.5",
+        pytest.param("1.2,0.3,-0.5", marks=pytest.mark.nightly),
         pytest.param("0.6,-0.2,0", marks=pytest.mark.nightly),
         pytest.param("-0.4,-0.3,0.5", marks=pytest.mark.nightly),
     ],
@@ -135,7 +136,13 @@ def _yaw(rotation_vector: np.ndarray) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("force", ["120,0,0", "-120,0,0", "0,60,0", "0,-60,0"])
+@pytest.mark.parametrize(
+    "force",
+    [
+        *("120,0,0", "0,-60,0"),
+        *(pytest.param(each, marks=pytest.mark.nightly) for each in ("-120,0,0", "0,60,0")),
+    ],
+)
 def test_a_push_is_borne_standing_or_by_a_step(force: str) -> None:
     positions, _, states = run(planned(4.5), f"root:{force}@1")
 

@@ -92,6 +92,7 @@ def test_the_policy_leads_while_it_is_calm(planner: HybridPlanner) -> None:
     assert planner.outlook.anchor == policy.outlook.anchor  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_it_plans_from_a_hard_push_until_it_has_been_calm_for_a_while(
     planner: HybridPlanner,
 ) -> None:
@@ -108,6 +109,7 @@ def test_it_plans_from_a_hard_push_until_it_has_been_calm_for_a_while(
     assert 4 * over < 96 + 2 * 240
 
 
+@pytest.mark.slow
 def test_it_plans_for_a_clip_without_a_policy(planner: HybridPlanner) -> None:
     led = []
     for tick in range(0, 320):
@@ -120,6 +122,7 @@ def test_it_plans_for_a_clip_without_a_policy(planner: HybridPlanner) -> None:
     assert not all(led[64:]), "it has been calm for a while"
 
 
+@pytest.mark.nightly
 def test_who_takes_over_sees_the_reference_where_it_had_given_way_to(
     planner: HybridPlanner,
 ) -> None:
@@ -143,6 +146,7 @@ def _near(one: Anchor, other: Anchor) -> bool:
     return abs(one.place - other.place) < 0.01 and abs(one.yaw - other.yaw) < 0.02
 
 
+@pytest.mark.slow
 def test_a_state_that_comes_again_is_answered_alike(planner: HybridPlanner) -> None:
     once = [answer(planner, tick, slip=1.5) for tick in range(0, 48, 4)]
     assert planner.plans
@@ -174,8 +178,9 @@ def test_a_copy_goes_on_where_commands_are_late(
         assert found.tobytes() == expected.tobytes()
 
 
+@pytest.mark.slow
 @DUPLICATES
-@pytest.mark.parametrize("taken", [5, 30])
+@pytest.mark.parametrize("taken", [pytest.param(5, marks=pytest.mark.nightly), 30])
 def test_a_copy_goes_on_to_the_same_bits(
     duplicate: Callable[[HybridPlanner], HybridPlanner], taken: int, planner: HybridPlanner
 ) -> None:
@@ -198,6 +203,7 @@ def pushed(impulse: float, planner: str) -> Iterator[Tick]:
     return ticks_in_process(plan, [plan_push(plan, "root", (0.0, impulse / 0.2, 0.0), 1.2)])
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_it_bears_a_push_that_fells_the_policy() -> None:
     heights = {}
@@ -209,6 +215,7 @@ def test_it_bears_a_push_that_fells_the_policy() -> None:
     assert len(heights["hybrid"]) == 6 * 240
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_run_has_the_same_bits_again_and_in_a_replay(tmp_path: Path) -> None:
     hashes = []

@@ -341,6 +341,7 @@ def test_commands_may_be_late(policy: str) -> None:
     assert walked(policy, 0.1, {"command_delay_ticks": 2}) == late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 def test_it_bears_late_commands(engine: str) -> None:
     late = {"command_delay_ticks": 2}
@@ -369,6 +370,7 @@ def test_its_contacts_keep_their_points(policy: str) -> None:
     assert plan.simulator["contact_breaking_threshold"] == 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 def test_a_run_has_the_same_bits_again_and_in_a_replay(
     policy: str, engine: str, tmp_path: Path
@@ -409,7 +411,10 @@ def test_a_controller_takes_the_policy_of_what_its_behaviour_tracks() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("through", [[], ["--through-topics", "controller"]])
+@pytest.mark.parametrize(
+    "through",
+    [[], pytest.param(["--through-topics", "controller"], marks=pytest.mark.nightly)],
+)
 def test_who_falls_gets_up_by_the_policy_of_that_clip(through: list[str], tmp_path: Path) -> None:
     run = tmp_path / "run"
     command = ["run", "--in-process", "--clip", "walk", "--duration", "5", "--planner", "policy"]
@@ -425,6 +430,7 @@ def test_who_falls_gets_up_by_the_policy_of_that_clip(through: list[str], tmp_pa
     assert main(["replay", str(run), *through]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", INSTALLED_ENGINES)
 def test_the_shipped_steered_one_goes_where_it_is_told_to(engine: str) -> None:
     """From standing, in a bend: 4 s, on an engine."""

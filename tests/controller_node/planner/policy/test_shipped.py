@@ -16,13 +16,20 @@ from controller_node.planner.settings import HYBRID
 from sim_node.physics.engine import INSTALLED_ENGINES
 from tests.support.physics import character
 
+NIGHTLY = pytest.mark.nightly
 MOST_BYTES = 300_000
 # By itself it falls going back, aside and in running bends: it is for a planner that takes over.
 WITH_A_PLANNER = {STEERED: {"planner": HYBRID, "plan.workers": 1, "plan.period": 0.1}}
 
 
-@pytest.mark.parametrize("name", shipped_policies())
-@pytest.mark.parametrize("engine", INSTALLED_ENGINES)
+@pytest.mark.parametrize(
+    ("name", "engine"),
+    [
+        pytest.param(name, engine, marks=[] if at % len(INSTALLED_ENGINES) == turn else NIGHTLY)
+        for at, name in enumerate(shipped_policies())
+        for turn, engine in enumerate(INSTALLED_ENGINES)
+    ],
+)
 def test_it_keeps_its_clip_by_joint_torques_alone(
     name: str, engine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

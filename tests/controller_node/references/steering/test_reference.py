@@ -203,6 +203,7 @@ def test_a_flood_of_commands_to_come_is_rejected() -> None:
             reference = reference.steered(VelocityCommand(10 + tick, 0.5), 0).reference
 
 
+@pytest.mark.slow
 def test_commands_of_a_long_run_are_forgotten() -> None:
     reference = make()
     for tick in range(0, 60_000, 20):  # more than may wait

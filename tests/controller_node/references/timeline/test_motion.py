@@ -179,6 +179,7 @@ def link_frame(name: str, state: ReferenceState, link: str) -> tuple[FloatArray,
 REACH = {"at": 1.0, "until": 2.0, "link": "right_wrist", "point": [0.35, -0.25, 1.1], "out": 0.5}
 
 
+@pytest.mark.slow
 def test_a_hand_is_at_its_point_from_when_to_when_it_is_said(tmp_path: Path) -> None:
     reference = made(tmp_path, steering=[SLOW], reach=[REACH])
     alone = made(tmp_path, steering=[SLOW])

@@ -127,6 +127,7 @@ def check(content: dict[str, Any]) -> None:
         before = state
 
 
+@pytest.mark.slow
 @given(timelines())
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_random_timeline_is_tracked_or_refused_in_a_line(content: dict[str, Any]) -> None:

@@ -138,7 +138,9 @@ OWN = [*(PROJECT / "tests/data").glob("*.urdf"), *(PROJECT / "msgs_config").rglo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize(
+    "part", [2, *(pytest.param(part, marks=pytest.mark.nightly) for part in (0, 1, 3))]
+)
 def test_robots_that_pybullet_ships_are_bullets(tmp_path: Path, part: int) -> None:
     assert sum(assert_bullets(tmp_path, urdf) for urdf in sorted(SHIPPED)[part::4]) > 100
 
@@ -255,6 +257,7 @@ class Dice:
         return robot(*(self.link(f"l{number}") for number in range(count)), *joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_random_robots_are_bullets(tmp_path: Path, seed: int) -> None:
     groups, ends = tmp_path / "groups.obj", tmp_path / "ends.obj"
