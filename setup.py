@@ -36,7 +36,7 @@ def read_readme():
 
 setup(
     name=PACKAGE,
-    version="0.2.0",  # catkin_prepare_release writes it here and in package.xml
+    version="0.3.0",  # catkin_prepare_release writes it here and in package.xml
     description="Physically simulated characters, actuated by torques over ROS 2 topics.",
     long_description=read_readme(),
     long_description_content_type="text/markdown",
