@@ -115,8 +115,9 @@ class Trials:
 
     def _try(self, sizes: Sizes) -> None:
         events = self.shrinking.events(sizes)
+        begin = self._latest_keyframe(events)
         self._count()
-        self._learn_of(sizes, lambda: run_trial(self.setting, events, self._latest(events)))
+        self._learn_of(sizes, lambda: run_trial(self.setting, events, begin))
 
     def _try_together(self, pool: WorkerProcesses, choices: Sequence[Sizes]) -> None:
         """Begin the first choice, and others where there is room; learn of those that end next."""
@@ -141,8 +142,8 @@ class Trials:
             if number and len(self._begun) >= self._at_once:
                 return
             self._count()
-            future = pool.submit(_Worker.run, tuple(events), self._latest(events))
-            self._begun[key] = sizes, future
+            begin = self._latest_keyframe(events)
+            self._begun[key] = sizes, pool.submit(_Worker.run, tuple(events), begin)
 
     def _learn_of(self, sizes: Sizes, ended: Callable[[], Ended]) -> None:
         """Learn of a choice; one that a node refuses, or that diverges, does not fall.
@@ -176,7 +177,7 @@ class Trials:
         if falls and (self.best is None or _cost(sizes) < _cost(self.best)):
             self.best = dict(sizes)
 
-    def _latest(self, events: Sequence[Event]) -> Keyframe | None:
+    def _latest_keyframe(self, events: Sequence[Event]) -> Keyframe | None:
         """The last keyframe of a run that was sent the same before."""
         rows = sorted({row for row, _ in self._keyframes}, reverse=True)
         return next(
